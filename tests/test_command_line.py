@@ -444,6 +444,7 @@ NUMBA = {
 }
 
 
+@pytest.mark.sample(without=["no compiler, check"], every=2)
 @pytest.mark.parametrize(("arguments", "variable", "code", "err"), NUMBA.values(), ids=NUMBA)
 def test_variables_of_numba_cost_no_traceback(empty_folder, arguments, variable, code, err):
     name, value = variable.split("=")

@@ -8,6 +8,7 @@ from PIL import Image
 from plumbob.bench.show import scenes
 
 
+@pytest.mark.sample(without=["curves", "cloths"])
 @pytest.mark.parametrize("name", draw_gallery.PICTURES)
 def test_a_famous_fault_shows_beside_the_right_solver(name, monkeypatch):
     monkeypatch.setattr(scenes, "FRAMES", 20)
@@ -18,6 +19,7 @@ def test_a_famous_fault_shows_beside_the_right_solver(name, monkeypatch):
     assert right.errors[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_the_gallery_has_pictures_and_films(tmp_path, monkeypatch):
     monkeypatch.setattr(scenes, "FRAMES", 12)
     names = ["cloths.svg", "explicit_euler.gif"]

@@ -63,6 +63,7 @@ def test_the_library_leaves_ctrl_c_as_it_is(tmp_path):
 CLOSED = {"stdin": [0], "stdout": [1], "stderr": [2], "both": [1, 2], "all": [0, 1, 2]}
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("closed", CLOSED.values(), ids=CLOSED)
 @pytest.mark.parametrize(("arguments", "code"), [(["chek"], 2), (["check", "--list"], 0)])
 def test_a_closed_stream_costs_what_is_printed_there(tmp_path, closed, arguments, code):

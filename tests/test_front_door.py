@@ -73,6 +73,7 @@ def forward_kinematics(parents, offsets, local_rotations):
 """
 
 
+@pytest.mark.slow
 def test_a_module_of_the_same_name_where_one_works_is_left_alone(tmp_path):
     """A user's own bench.py neither breaks the import nor stops the judge."""
     for name in ("bench.py", "reference/__init__.py", "verify/__init__.py"):

@@ -49,6 +49,7 @@ def blocks(page):
     return re.findall(r"```python\n(.*?)```\n(?:\n```text\n(.*?)```)?", programs, re.DOTALL)
 
 
+@pytest.mark.sample(without=["show"])
 @pytest.mark.parametrize("page", PROGRAMS, ids=lambda page: page.stem)
 def test_the_blocks_of_a_page_are_one_program_that_prints_what_it_says(
     page, capsys, monkeypatch, tmp_path
@@ -88,6 +89,7 @@ def flat(text):
     return re.sub(r"\s+", "", text)
 
 
+@pytest.mark.slow
 def test_the_solver_of_the_readme_is_right_and_is_said_to_be(tmp_path):
     run, report = verified(README, tmp_path)
     assert run.returncode == 0

@@ -79,6 +79,7 @@ def done(tmp_path_factory):
     return json.loads(process.stdout)
 
 
+@pytest.mark.sample(without=["verify solver.py --rerun"])
 @pytest.mark.parametrize("line", REFUSED)
 def test_a_file_without_end_is_refused_in_a_sentence(done, line):
     code, _, complaint = done[line]

@@ -78,9 +78,8 @@ def test_claim_holds(known, claim):
     assert verdict.cases == (FEW if claim.name in ON_FILES else claim.cases)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] * (n in LONG)) for n in CLAIMS]
-)
+@pytest.mark.sample(every=8, without=LONG)
+@pytest.mark.parametrize("name", CLAIMS)
 def test_claim_holds_on_the_plain_sources(name):
     with set_backend("python"):
         assert check_claim(CLAIMS[name], FEW).holds

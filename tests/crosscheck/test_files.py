@@ -455,6 +455,7 @@ def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
     assert compare(SECOND_READER, file).outcome == DIFFERS
 
 
+@pytest.mark.slow
 def test_a_file_that_crashes_an_engine_loses_only_that_reading(folder):
     """So many bodies in each other are more than the stack that Pinocchio 4.1 reads on holds."""
     deep = '<body name="a">' * 60_000 + "</body>" * 60_000
@@ -499,6 +500,7 @@ def loud():
     return os.getpid()
 
 
+@pytest.mark.slow
 def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
     with closing(CallProcess(nothing, patience=0.3)) as child:
         first = child.call(loud)
@@ -517,6 +519,7 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_call_that_waits_for_the_processor_is_not_lost():
     """Only its own processor time counts: no waiting, no start, nothing between two calls."""
     with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:

@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 from plumbob.reference import Articulation, Mimic, Skeleton, forward_kinematics, rotation
 from plumbob.reference.articulation import KINDS, clamp_ball, swing_twist
 
+pytestmark = pytest.mark.both_backends
+
 # Eight joints with offsets of a few metres, slides and free joints: some dozens of roundings.
 ROUNDING = 1e-13
 # Where a ball is tilted by nearly pi, its twist is known only to 1e-16 over the rest.

@@ -6,6 +6,8 @@ from hypothesis.extra import numpy as arrays
 
 from plumbob.reference import curves, resample
 
+pytestmark = pytest.mark.both_backends
+
 # Dividing a gap rounds: each spacing is met but for a few eps of the coordinates.
 ROUNDING = 1e-12
 

@@ -9,6 +9,8 @@ from plumbob.reference import Articulation, Mimic, Skeleton, forward_kinematics,
 from plumbob.reference.articulation import KINDS
 from plumbob.reference.jacobians import difference, integrate, jacobian, jacobians
 
+pytestmark = pytest.mark.both_backends
+
 # Central differences over a step of 1e-5 are off by 1e-10 of a few metres, and rounding by 1e-11.
 STEP, DIFFERENCE = 1e-5, 1e-8
 ROUNDING = 1e-13

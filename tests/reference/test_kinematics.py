@@ -15,6 +15,8 @@ from plumbob.reference import (
 from plumbob.reference.backend import compiled
 from plumbob.reference.backend.simd.vectors import LANES
 
+pytestmark = pytest.mark.both_backends
+
 # Six joints: a dozen products and sums of numbers of order one.
 ROUNDING = 1e-14
 

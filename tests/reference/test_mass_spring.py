@@ -21,6 +21,8 @@ from plumbob.reference.mass_spring import (
     stiffness_matrix,
 )
 
+pytestmark = pytest.mark.both_backends
+
 # Sums of a few dozen terms round by a few units in the last place of the largest.
 ROUNDING = 1e-14
 

@@ -7,6 +7,8 @@ from hypothesis import strategies as st
 from plumbob.reference import rotation
 from plumbob.reference.quaternion import half_angle, perpendicular
 
+pytestmark = pytest.mark.both_backends
+
 # Products of unit quaternions round to a few eps; 32 allows a dozen operations.
 ROUNDING = 32 * np.finfo(float).eps
 # A series sums terms below one: a few halves of an eps, where one term too few leaves six.

@@ -13,6 +13,8 @@ from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 
+pytestmark = pytest.mark.usefixtures("verdict_alone")
+
 FORCES, ENERGY, STEP, MOTION = (
     "mass_spring_forces", "energy", "mass_spring_step", "mass_spring_motion",
 )  # fmt: skip
@@ -124,6 +126,7 @@ def test_right_springs_are_right(task, precision):
     assert len(report.judgements) == len(NAMES)
 
 
+@pytest.mark.sample("forces")
 @pytest.mark.parametrize("misreading", MISREADINGS)
 @pytest.mark.parametrize("task", TASKS)
 def test_zeros_and_both_signs_of_a_stretch_are_asked(task, misreading):
@@ -292,6 +295,7 @@ def report_of_arm(task, precision="double", **misread):
     return judged(task, getattr(arm, ROBOT_TASKS[task]), cases, precision=precision)
 
 
+@pytest.mark.sample(without=["inverse_kinematics", "robot_track"])
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("task", ROBOT_TASKS)
 def test_a_right_arm_is_right(task, precision):
@@ -300,12 +304,14 @@ def test_a_right_arm_is_right(task, precision):
     assert any(FAR in one.case.name for one in report.judgements)
 
 
+@pytest.mark.sample("robot_velocity")
 @pytest.mark.parametrize("read", [slides_wrapped, all_wrapped])
 @pytest.mark.parametrize("task", ROBOT_TASKS)
 def test_coordinates_beyond_pi_are_asked(task, read):
     assert any(FAR in name for name in wrong_cases(report_of_arm(task, read=read)))
 
 
+@pytest.mark.sample("robot_velocity")
 @pytest.mark.parametrize("task", [task for task in ROBOT_TASKS if task != "robot_track"])
 def test_slides_along_oblique_axes_are_asked(task):
     def nearest(axis):
@@ -315,6 +321,7 @@ def test_slides_along_oblique_axes_are_asked(task):
     assert any(OBLIQUE in name for name in wrong)
 
 
+@pytest.mark.sample(without=["w >= 0"])
 @pytest.mark.parametrize("signs", [same, lambda q, _: short_way(q)], ids=["as it comes", "w >= 0"])
 def test_rotations_the_long_way_round_are_asked(signs):
     report = report_of_arm("robot_inverse_kinematics", sign=lambda q: q, signs=signs)

@@ -15,6 +15,8 @@ from plumbob.verify.kinematics.predictions import forward, path_to, solve
 from plumbob.verify.mass_spring.problem import all_forces, elastic_energy, problem_of
 from plumbob.verify.verify import verify
 
+pytestmark = pytest.mark.usefixtures("verdict_alone")
+
 IK, TRACK, FORCES, ENERGY, STEP = (
     "inverse_kinematics", "track", "mass_spring_forces", "energy", "mass_spring_step",
 )  # fmt: skip
@@ -86,9 +88,8 @@ SOLVERS = {
 }
 
 
-@pytest.mark.parametrize(
-    "name", [n if n == "fabrik" else pytest.param(n, marks=pytest.mark.slow) for n in SOLVERS]
-)
+@pytest.mark.sample("fabrik")
+@pytest.mark.parametrize("name", SOLVERS)
 def test_constant_iterations_and_tolerance_are_found_and_said(name):
     solver, method, count = SOLVERS[name]
     report = judged(IK, solver, methods=(method,))
@@ -98,6 +99,7 @@ def test_constant_iterations_and_tolerance_are_found_and_said(name):
     )
 
 
+@pytest.mark.sample("library")
 @pytest.mark.parametrize("name", ["library", "fabrik"])
 def test_declared_constants_are_no_assumption(name):
     solver, method, _ = SOLVERS[name]
@@ -109,10 +111,9 @@ def test_declared_constants_are_no_assumption(name):
     assert report.verdict <= Verdict.RIGHT_EXCEPT
 
 
+@pytest.mark.sample("declared0-wrong0")
 @pytest.mark.parametrize("wrong", [{"skips_root": True}, {"is_carried": True}])
-@pytest.mark.parametrize(
-    "declared", [{"fixed": CONSTANTS}, pytest.param({}, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("declared", [{"fixed": CONSTANTS}, {}])
 def test_a_wrong_solver_with_constants_is_wrong(wrong, declared):
     report = judged(IK, turn_bodies(**wrong), methods=("ccd",), **declared)
     assert report.verdict is Verdict.WRONG
@@ -150,6 +151,7 @@ def test_tracks_with_a_constant_tolerance(name):
     assert declared.verdict is Verdict.RIGHT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("wrong", "method"), [("skips_root", "ccd"), ("is_carried", "mine")])
 def test_a_wrong_track_with_constants_is_wrong(wrong, method):
     report = judged(TRACK, follow(turn_bodies(**{wrong: True})), methods=(method,))
@@ -203,6 +205,7 @@ SYSTEMS = {
 }
 
 
+@pytest.mark.sample(without=["forces, ", "step, ", "total"])
 @pytest.mark.parametrize("name", SYSTEMS)
 def test_a_constant_gravity_is_asked_about_and_right_if_declared(name):
     task, function, gravity, declared = SYSTEMS[name]

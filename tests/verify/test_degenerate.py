@@ -93,6 +93,7 @@ FABRIK = {
 }
 
 
+@pytest.mark.sample(every=4)
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 @pytest.mark.parametrize("arithmetic", ["NaN", "exceptions"])
 @pytest.mark.parametrize(("method", "causes"), [("ccd", CCD), ("fabrik", FABRIK)])
@@ -168,7 +169,9 @@ def test_failure_in_an_ordinary_case_is_broken(raises):
     assert judged(INVERSE, function, "fabrik").verdict is BROKEN
 
 
+@pytest.mark.sample("levenberg")
 @pytest.mark.parametrize("method", ["", "levenberg_marquardt"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_guard_is_named_for_unknown_methods_too(method):
     solve = reference(INVERSE, "levenberg_marquardt")
 
@@ -182,6 +185,8 @@ def test_guard_is_named_for_unknown_methods_too(method):
     assert "The case is: A target at the root itself." in complaints(report)["at the root"]
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_zero_quaternion_is_broken_and_named():
     report = judged(INVERSE, lambda local_rotations, **_: 0.0 * local_rotations, "ccd")
     assert report.verdict is BROKEN

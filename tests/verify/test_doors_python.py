@@ -205,6 +205,7 @@ def three_joints(body):
     return f"import helper\n{FORWARD}if len(parents) == 3:\n        {body}\n    return offsets\n"
 
 
+@pytest.mark.sample(every=2)
 @rows("survives")
 def test_a_process_survives_or_is_started_anew(solver, body, message):
     contestant = solver(three_joints(body), helper="def deep(x):\n    return 1 / x\n")

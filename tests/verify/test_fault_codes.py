@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from itertools import groupby
 from pathlib import Path
 
@@ -120,10 +121,6 @@ def test_cases_are_folded_where_a_mistake_is_shown(switches, is_open):
 # ---- the short programs of each code
 
 
-# So many programs are judged for one that is quick to test; the others are slow tests.
-QUICK = 40
-
-
 def reports(program, task):
     (report,) = verify(contestant_of(program), [task]).tasks
     return report
@@ -138,13 +135,17 @@ BY_LINES = (
 )  # fmt: skip
 
 
-def samples():
-    own_tests = [f for f in coded_faults().values() if f.family == "LINE" or f.code in BY_LINES]
-    faults = [fault for fault in coded_faults().values() if fault not in own_tests]
-    for number, fault in enumerate(faults):
-        is_quick = number % QUICK == 0 and fault.family not in ("LIMIT", "ROBOT", "STEP")
-        marks = () if is_quick else pytest.mark.slow
-        yield pytest.param(fault, id=fault.code, marks=marks)
+# `verify --self-test` judges the programs of these, in test_self_test.py.
+SELF_TESTED = ("LIMIT", "ROBOT", "VELOCITY")
+
+
+@cache
+def faults_with_programs():
+    return [
+        fault
+        for fault in coded_faults().values()
+        if fault.family not in ("LINE", *SELF_TESTED) and fault.code not in BY_LINES
+    ]
 
 
 def test_no_cause_has_figures_of_the_answers_of_a_run():
@@ -171,16 +172,33 @@ EQUAL = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("fault", list(samples()))
-def test_a_wrong_program_is_named_by_its_code(fault):
+def is_named_by_its_code(fault):
+    """Whether the program of a fault is not right, and a first explanation or hint has its code."""
     report = reports(fault.wrong_program, fault.task)
-    assert report.verdict > Verdict.RIGHT
     names = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
     names += report.diagnosis.hints
     if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
         names += [words for judgement in report.judgements for words in judgement.complaints]
     code = EQUAL.get(fault.code, fault.code)
-    assert code in {code for words in names for code in codes_in(words)}
+    codes = {code for words in names for code in codes_in(words)}
+    return report.verdict > Verdict.RIGHT and code in codes
+
+
+@pytest.mark.parametrize("number", range(6))
+def test_a_sample_of_wrong_programs_is_named_by_their_codes(number):
+    """Every 120th fault: the list goes through all families."""
+    fault = faults_with_programs()[120 * number]
+    assert is_named_by_its_code(fault), fault.code
+
+
+PARTS = 60
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("part", range(PARTS))
+def test_every_wrong_program_is_named_by_its_code(part):
+    faults = faults_with_programs()[part::PARTS]
+    assert [fault.code for fault in faults if not is_named_by_its_code(fault)] == []
 
 
 # What hides these from most laws: a claim that only few cases refute, pins that have no step, and
@@ -188,9 +206,10 @@ def test_a_wrong_program_is_named_by_its_code(fault):
 HIDDEN = ("PB-CLAIM-024", "PB-CLAIM-032", "PB-STEP-080", "PB-STEP-082")
 
 
+@pytest.mark.sample("CLAIM")
 @pytest.mark.parametrize("code", HIDDEN)
 def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
-    test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
+    assert is_named_by_its_code(coded_faults()[code])
 
 
 @pytest.mark.slow
@@ -198,23 +217,15 @@ def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
 def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch):
     module = sys.modules["plumbob.verify.verify"]
     monkeypatch.setattr(module, "with_changed_line", search.with_changed_line)
-    test_a_wrong_program_is_named_by_its_code(coded_faults()[code])
+    assert is_named_by_its_code(coded_faults()[code])
 
 
 RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "task" in entry}
-STEPS = (
-    "step", "substeps", "local-global step", "Newton iterations", "change of velocity",
-    "damped change of velocity", "particle by particle", "motion", "conjugate gradients",
-    "Newton's method with a line search", "implicit step", "implicit motion", "linearised motion",
-)  # fmt: skip
-SLOW = ("limited ccd", "robot", "robot_track", "newton step", *STEPS[2:])
 RESERVED = ("robot", "robot_track")
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.slow if name in SLOW else ()) for name in RIGHT_PROGRAMS],
-)
+@pytest.mark.sample(every=13)
+@pytest.mark.parametrize("name", RIGHT_PROGRAMS)
 def test_a_right_program_is_right(name):
     tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
     # A start from which a robot finds no solution, or a single iteration in each frame.
@@ -236,6 +247,7 @@ def test_a_line_that_the_program_lacks_is_refused():
         _ = fault.wrong_program
 
 
+@pytest.mark.sample("097")
 @pytest.mark.parametrize("code", ["PB-STEP-120", "PB-STEP-097"])
 def test_a_known_mistake_of_a_step_stands_beside_the_right_numbers(code):
     """The step is undeclared, and recognised with its mistake alone."""
@@ -258,6 +270,7 @@ def printed(*words):
     return run.returncode, run.stdout + run.stderr
 
 
+@pytest.mark.sample("en")
 @pytest.mark.parametrize("language", ["en", "zh"])
 def test_a_code_in_small_letters_is_explained_with_lines_and_a_failing_case(language):
     fault, say = coded_faults()["PB-FK-003"], speaker(language)
@@ -271,6 +284,7 @@ def test_a_code_in_small_letters_is_explained_with_lines_and_a_failing_case(lang
     assert "positions[" in text or "rotations[" in text
 
 
+@pytest.mark.slow
 def test_a_program_whose_answers_are_no_numbers_is_explained():
     code, text = printed("PB-FABRIK-014")
     assert code == 0

@@ -160,13 +160,8 @@ def screen(report):
     return " ".join(" ".join(text).split())
 
 
-# The others take seconds each.
-QUICK = ("no branches", "last joint", "points", "one stiffness", "no pins")
-
-
-@pytest.mark.parametrize(
-    "kind", [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS]
-)
+@pytest.mark.sample("no branches")  # the others take seconds each
+@pytest.mark.parametrize("kind", KINDS)
 def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
     task, function, fields = KINDS[kind]
     report = judged(task, function)
@@ -184,12 +179,14 @@ def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
 
 
 @pytest.mark.parametrize("kind", ["chains, CCD", "one mass"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_declared_restriction_needs_no_inference(kind):
     task, function, fields = KINDS[kind]
     declared = fields if task == IK else {"system": System(**fields)}
     assert not judged(task, function, **declared).tasks[0].assumptions
 
 
+@pytest.mark.sample(without=["step-<lambda>", "forces-<lambda>1", "forces-<lambda>2"])
 @pytest.mark.parametrize(("task", "function"), [
     (FORCES, forces(lambda i: i | {"masses": np.ones(len(i["masses"]))})),  # no mass at all
     (FORCES, forces(lambda i: i | {"masses": i["masses"][::-1]})),  # right if all are equal
@@ -197,6 +194,7 @@ def test_a_declared_restriction_needs_no_inference(kind):
     (STEP, step(lambda i: i | {"pinned": i["pinned"][:1]})),  # right without pins
     (FK, lambda **i: forward(chain(i | {"offsets": 2.0 * i["offsets"]}))),
 ])  # fmt: skip
+@pytest.mark.usefixtures("verdict_alone")
 def test_inference_hides_no_fault(task, function):
     assert judged(task, function).verdict is Verdict.WRONG
 
@@ -231,6 +229,7 @@ def returning(change):
     return solver
 
 
+@pytest.mark.sample(every=3)
 @pytest.mark.parametrize(("change", "words"), [
     (lambda local: np.tile([1.0, 0.0, 0.0, 0.0], (len(local), 1)), "are the identity"),
     (lambda local: local, "repeat the local rotations of the start"),
@@ -262,6 +261,7 @@ def biased(how):
 
 @pytest.mark.parametrize(("how", "verdict"), [
     ("shifted", Verdict.WRONG), ("rotated", Verdict.RIGHT_EXCEPT)])  # fmt: skip
+@pytest.mark.usefixtures("verdict_alone")
 def test_another_answer_in_another_world_is_not_right(how, verdict):
     report = judged(IK, biased(how), methods=("mine",))
     found = [f for j in report.tasks[0].judgements for f in j.findings if f.law == "equal worlds"]
@@ -310,6 +310,7 @@ FLOAT_CHAIN = """
 """
 
 
+@pytest.mark.slow
 def test_a_program_in_floats_without_branches_and_nothing_else_written(tmp_path):
     if shutil.which("g++") is None:
         pytest.skip("g++ is not on this machine")
@@ -333,7 +334,8 @@ def test_a_program_in_floats_without_branches_and_nothing_else_written(tmp_path)
         assert field in text
 
 
-@pytest.mark.parametrize("name", ["linearised", pytest.param("symplectic", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["linearised", "symplectic"])
 def test_an_inferred_step_is_declared_as_the_report_says(name):
     stepper = Stepper(DECLARED[name][0])
     (report,) = judged(STEP, stepper, step=Step()).tasks

@@ -60,14 +60,6 @@ NEIGHBOURS = {
 }
 
 
-QUICK = ("transpose", "damping rises", "another error")
-
-
-def sampled(names):
-    """Return parameters, of which all but a few are slow tests."""
-    return [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in names]
-
-
 @cache
 def sweeps(greeting):
     cases = problems.cases(greeting, "jacobian", 0, False)
@@ -99,12 +91,14 @@ def test_a_model_has_to_explain_three_steps_and_three_fifths_of_all(hits, count,
     assert (best, len(results)) == ((["one mistake"], hits) if is_enough else ([], 0))
 
 
-@pytest.mark.parametrize("name", sampled(HONEST))
+@pytest.mark.sample("transpose")
+@pytest.mark.parametrize("name", HONEST)
 def test_honest_steps_are_not_accused(name):
     assert explanations(HONEST[name]) == ()
 
 
-@pytest.mark.parametrize("key", sampled(NUMBERS))
+@pytest.mark.sample("damping rises")
+@pytest.mark.parametrize("key", NUMBERS)
 def test_mistake_shows_its_number(key):
     changes, words = NUMBERS[key]
     (explanation,) = explanations(changes)
@@ -112,7 +106,8 @@ def test_mistake_shows_its_number(key):
     assert words in str(explanation.sentence)
 
 
-@pytest.mark.parametrize("key", sampled(NEIGHBOURS))
+@pytest.mark.sample("another error")
+@pytest.mark.parametrize("key", NEIGHBOURS)
 def test_neighbour_of_a_mistake_is_named(key):
     (explanation,) = explanations(NEIGHBOURS[key])
     assert explanation.faults == (key,)

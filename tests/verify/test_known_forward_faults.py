@@ -1,7 +1,5 @@
 """Known faults of forward kinematics are applied where a solver's CCD and FABRIK are judged."""
 
-import itertools
-
 import pytest
 from kinematics_solvers import FORWARD, INVERSE, METHODS, named, textbook
 
@@ -45,13 +43,10 @@ def reports(base, own, method, declared=True):
     ).tasks
 
 
-QUICK = [(BASES[0], "fabrik", True), (BASES[1], "ccd", False), (BASES[3], "fabrik", False)]
-
-
-@pytest.mark.parametrize(("base", "method", "declared"), [
-    pytest.param(*trial, marks=() if trial in QUICK else pytest.mark.slow)
-    for trial in itertools.product(BASES, METHODS, (True, False))
-])  # fmt: skip
+@pytest.mark.sample("base0-fabrik-True")
+@pytest.mark.parametrize("declared", [True, False])
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("base", BASES)
 def test_solver_that_only_stands_on_wrong_forward_kinematics_is_said_to(base, method, declared):
     forward, inverse = reports(base, [], method, declared)
     assert set(base) <= set(" + ".join(named(forward)[0]).split(" + "))
@@ -61,10 +56,9 @@ def test_solver_that_only_stands_on_wrong_forward_kinematics_is_said_to(base, me
     assert set(base) <= set(first.faults[0].split(" + "))
 
 
-@pytest.mark.parametrize(("base", "method"), [
-    pytest.param(*trial, marks=() if i == 1 else pytest.mark.slow)
-    for i, trial in enumerate(itertools.product(BASES[1:], METHODS))
-])  # fmt: skip
+@pytest.mark.slow
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("base", BASES[1:])
 def test_fault_on_top_of_wrong_forward_kinematics_is_named(base, method):
     for own in OWN[method]:
         _, inverse = reports(base, [own], method)

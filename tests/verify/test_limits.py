@@ -131,6 +131,7 @@ def test_a_misreading_is_wrong_and_named(fault):
     assert [explanation.codes for explanation in report.diagnosis.explanations] == [(fault.code,)]
 
 
+@pytest.mark.slow
 def test_targets_that_another_mistake_misses_tell_nothing_about_limits():
     (clamped,) = (fault for fault in FAULTS if fault.code == "PB-LIMIT-002")
     greeting = Greeting(PROTOCOL, (TASK,), methods=("ccd",), limits=True)

@@ -65,14 +65,6 @@ def named(report):
     return [set(key.split(" + ")) for key in keys]
 
 
-def mark(names, quick):
-    """Return parameters of which only some run by default."""
-    return [
-        pytest.param(name, marks=() if name in quick else pytest.mark.slow, id=str(name))
-        for name in names
-    ]
-
-
 def broken_laws(report):
     findings = (finding for judgement in report.judgements for finding in judgement.findings)
     return {finding.law for finding in findings if finding.verdict >= Verdict.WRONG}
@@ -169,7 +161,8 @@ PAIRS = [
 THREE = ("gravity doubled", "matrix doubled beside", "velocity over 2h")
 
 
-@pytest.mark.parametrize("keys", mark([*PAIRS[::4], THREE], [PAIRS[8], THREE]))
+@pytest.mark.sample(str(PAIRS[8]))
+@pytest.mark.parametrize("keys", [*PAIRS[::4], THREE], ids=str)
 def test_faults_at_once_are_named(keys):
     model, declared = DECLARED["linearised"]
     stepper = Stepper(model, [BY_KEY[key] for key in keys])
@@ -204,7 +197,8 @@ HONEST = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", mark(HONEST, ("global factor", "from s_n, which it calls y")))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", HONEST)
 def test_an_honest_step_is_not_accused(name):
     model, declared = HONEST[name]
     assert_not_accused(report(Stepper(model), step=declared))
@@ -238,6 +232,7 @@ def test_steps_of_the_reference_and_of_mujoco_are_not_accused(name):
     assert_not_accused(report(step, step=declared))
 
 
+@pytest.mark.slow
 def test_one_iteration_is_not_taken_for_convergence():
     judged = report(Stepper(StepModel(Integrator("local_global"))), step=DECLARED["converged"][1])
     assert judged.verdict is Verdict.WRONG
@@ -262,7 +257,8 @@ UNDECLARED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", mark(UNDECLARED, ("one iteration, penalty",)))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", UNDECLARED)
 def test_faults_of_a_solver_that_declares_nothing_are_named(name):
     model, keys, system, single = UNDECLARED[name]
     step = Stepper(model, [BY_KEY[key] for key in keys], np.float32 if single else np.float64)
@@ -291,6 +287,7 @@ def extended_position_based(**inputs):
     return {"positions": x, "velocities": (x - p.positions) / p.h}
 
 
+@pytest.mark.slow
 def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told(monkeypatch):
     monkeypatch.setattr(search, "MAX_FAULTS", 0)  # no pair or triple explains it either
     judged = report(extended_position_based)
@@ -382,7 +379,8 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", mark(SYSTEMS, ("the lab's",)))
+@pytest.mark.sample("the lab's")
+@pytest.mark.parametrize("name", SYSTEMS)
 def test_a_solver_gets_the_systems_that_it_takes(name):
     system = SYSTEMS[name]
     cases = task_cases("mass_spring_step", Greeting(1, (), system=system), 0, False)
@@ -414,13 +412,15 @@ class GoesOn:
         """Nothing was started."""
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_solver_that_goes_on_is_judged_from_its_own_state():
     model, declared = DECLARED["linearised"]
     judged = verify(GoesOn(Stepper(model), declared)).tasks[0]
     assert judged.verdict is Verdict.RIGHT, broken_laws(judged)
 
 
-@pytest.mark.parametrize("key", mark([None, "velocity kept", "gravity g/m"], [None]))
+@pytest.mark.sample("None")
+@pytest.mark.parametrize("key", [None, "velocity kept", "gravity g/m"])
 def test_a_motion_is_judged_as_its_steps(key):
     model, declared = DECLARED["linearised"]
     faults = [BY_KEY[key]] if key else []
@@ -483,6 +483,7 @@ def test_pairs_of_faults_of_forces_are_named():
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_right_forces_are_not_accused(precision):
     kind = np.float32 if precision == "single" else np.float64
     judged = report(force_function([], kind), "mass_spring_forces", precision=precision)
@@ -527,7 +528,8 @@ OF_CONSTANT_GRAVITY = (
 )  # fmt: skip
 
 
-@pytest.mark.parametrize("key", mark(ENERGY_FAULTS, [*ENERGY_FAULTS][::12]))
+@pytest.mark.sample(every=12)
+@pytest.mark.parametrize("key", ENERGY_FAULTS)
 def test_every_fault_of_energies_is_caught_and_named(key):
     judged = report(energies([ENERGY_FAULTS[key]]), "energy")
     is_asked = key.startswith("first ") and key.endswith("for all")  # what a greeting may declare
@@ -536,6 +538,7 @@ def test_every_fault_of_energies_is_caught_and_named(key):
     assert {key} in named(judged)
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_the_zero_of_gravity_is_free():
     assert report(energies([], shift=42.0), "energy").verdict is Verdict.RIGHT
 
@@ -575,6 +578,7 @@ def shifted(A, right):
     return np.linalg.solve(A + shift * np.eye(len(A)), right.ravel()).reshape(right.shape)
 
 
+@pytest.mark.slow
 def test_what_is_left_of_a_failed_factorisation_is_named_by_its_pattern():
     judged = report(solved_otherwise(lambda A, right: -0.1 * right))
     assert judged.verdict is Verdict.WRONG

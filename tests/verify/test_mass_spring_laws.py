@@ -24,6 +24,8 @@ from plumbob.verify.mass_spring.laws import (
 from plumbob.verify.mass_spring.model import Integrator, StepModel, predicted
 from plumbob.verify.mass_spring.problem import problem_of
 
+pytestmark = pytest.mark.usefixtures("verdict_alone")
+
 EPSILON = 2.0**-52
 LINEARISED = StepModel(Integrator("newton", "x_n", 1), damper="explicit")
 CONVERGED = StepModel(Integrator("converged", "y"))

@@ -12,7 +12,7 @@ from plumbob.verify.door import open_contestant
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.verify import verify
 
-QUICK = [
+SOME = [
     ("cpp", "ccd_world_left"),
     ("cpp", "forces_damping_sign"),
     ("javascript", "fk_local_rotation"),
@@ -46,7 +46,8 @@ def is_named(report, fault):
     return FAULTS[fault].get("name") in first_names(report)
 
 
-@pytest.mark.parametrize(("language", "fault"), QUICK)
+@pytest.mark.sample(every=3)
+@pytest.mark.parametrize(("language", "fault"), SOME)
 def test_a_planted_fault_is_named(language, fault, program):
     report = judged(program(language), fault)
     assert report.verdict > Verdict.RIGHT
@@ -65,9 +66,8 @@ def test_every_planted_fault_is_named_but_for_known_ones(language, program):
         assert is_named(report, fault) or not {"name", "hint"} & known.keys()
 
 
-@pytest.mark.parametrize(
-    "language", ["cpp", "javascript", "python", pytest.param("single", marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("language", ["cpp", "javascript", "python", "single"])
 def test_right_program_is_not_accused(language, program):
     contestant = open_contestant(program(language))
     try:
@@ -100,14 +100,10 @@ def unlike(one, other):
 
 
 PLANTED = [(language, fault) for language in IN for fault in IN[language]]
-# The compiled program starts at once; of those that an interpreter runs, every sixth is quick.
-CHOSEN = [
-    pytest.param(*pair, marks=[] if pair[0] == "cpp" or n % 6 == 0 else [pytest.mark.slow])
-    for n, pair in enumerate(PLANTED)
-]
 
 
-@pytest.mark.parametrize(("language", "fault"), CHOSEN)
+@pytest.mark.sample(every=6)
+@pytest.mark.parametrize(("language", "fault"), PLANTED)
 def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
     answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)
     assert FAULTS[fault]["task"] in unlike(right_answers(language), answers)

@@ -26,9 +26,6 @@ from plumbob.verify.screen import terminal
 from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import DISCIPLINES, judge_cases, trials, verify
 
-# Of these kinds the programs are judged in half a second; the others are slow tests.
-QUICK = ("term", "order", "condition", "loop")
-
 
 def report_on(source, task):
     """Judge a program by its task's laws, and name no mistakes by lines."""
@@ -43,15 +40,13 @@ def changed_lines(source, task):
     return search.changed_lines(report, greeting)
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param(fault, id=fault.name, marks=() if fault.name in QUICK else pytest.mark.slow)
-        for fault in coded_faults().values()
-        if fault.family == "LINE"
-    ],
-)
-def test_a_changed_line_is_named(fault, monkeypatch):
+LINES = {fault.name: fault for fault in coded_faults().values() if fault.family == "LINE"}
+
+
+@pytest.mark.sample("order", "condition")  # the programs of the others take long
+@pytest.mark.parametrize("name", LINES)
+def test_a_changed_line_is_named(name, monkeypatch):
+    fault = LINES[name]
     monkeypatch.setattr(search, "SELF_NAMED", FAMILIES)  # lines that are known faults as well
     (explanation,) = changed_lines(fault.wrong_program, fault.task)
     assert explanation.codes == (fault.code,)
@@ -95,18 +90,16 @@ def test_a_fault_is_indented_as_the_line_that_it_replaces():
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=() if name in ("root to tip", "capped") else pytest.mark.slow)
-     for name in HONEST],
-)  # fmt: skip
+@pytest.mark.sample("capped")
+@pytest.mark.parametrize("name", HONEST)
 def test_another_honest_choice_is_no_mistake_of_a_program(name):
     method, function, options = HONEST[name]
     report = judged("inverse_kinematics", students.with_options(function, **options), method)
     assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
 
 
-@pytest.mark.parametrize("method", ["ccd", pytest.param("fabrik", marks=pytest.mark.slow)])
+@pytest.mark.sample("ccd")
+@pytest.mark.parametrize("method", ["ccd", "fabrik"])
 def test_another_honest_way_to_keep_limits_is_no_mistake(method):
     without_limits = reference("inverse_kinematics", method)
 
@@ -219,6 +212,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
     assert search.changed_lines(report, greeting) == ()
 
 
+@pytest.mark.sample(without=["0.0"])
 @pytest.mark.parametrize("factor", [0.0, 1.0])
 def test_answers_that_repeat_the_request_tell_nothing(factor):
     """Many lines may be missing where nothing is computed."""
@@ -293,25 +287,24 @@ def test_poses_are_compared_as_the_laws_read_them():
     assert explanation.share == 1.0
 
 
+@pytest.mark.sample("LINE-010", "LINE-005")
 @pytest.mark.parametrize(
     ("program", "method", "right", "wrong", "code"),
     [
         ("resample by arc lengths", "", "while k < len", "if k < len", "PB-LINE-010"),
-        pytest.param("forward kinematics by angles one after the other", "", "2 * (y * z - w * x)]",
-                     "2 * (y * z + w * x)]", "PB-QUAT-039", marks=pytest.mark.slow),
+        ("forward kinematics by angles one after the other", "", "2 * (y * z - w * x)]",
+         "2 * (y * z + w * x)]", "PB-QUAT-039"),
         ("forward kinematics by matrices, from the largest component", "",
          "2 * (y * z - w * x), 0", "2 * (y * z + w * x), 0", "PB-LINE-005"),
-        pytest.param("fabrik", "fabrik", "        P = R[parents[joint]]\n",
-                     "        P = R[joint]\n", "PB-QUAT-042", marks=pytest.mark.slow),
-        pytest.param("scene graph", "ccd", "        descendants += children_of(parents, k)\n", "",
-                     "PB-CCD-063", marks=pytest.mark.slow),
-        pytest.param("scene graph", "fabrik", "offsets[path[k + 1]]", "offsets[path[k]]",
-                     "PB-LINE-012", marks=pytest.mark.slow),
-        pytest.param("hinges and cones", "ccd", "multiply(tilt, twist)", "multiply(twist, tilt)",
-                     "PB-LIMIT-030", marks=pytest.mark.slow),
-        pytest.param("ccd", "ccd", "between(x[effector] - x[joint]",
-                     "between(x[effector] - x[max(parents[joint], 0)]", "PB-LINE-012",
-                     marks=pytest.mark.slow),
+        ("fabrik", "fabrik", "        P = R[parents[joint]]\n", "        P = R[joint]\n",
+         "PB-QUAT-042"),
+        ("scene graph", "ccd", "        descendants += children_of(parents, k)\n", "",
+         "PB-CCD-063"),
+        ("scene graph", "fabrik", "offsets[path[k + 1]]", "offsets[path[k]]", "PB-LINE-012"),
+        ("hinges and cones", "ccd", "multiply(tilt, twist)", "multiply(twist, tilt)",
+         "PB-LIMIT-030"),
+        ("ccd", "ccd", "between(x[effector] - x[joint]",
+         "between(x[effector] - x[max(parents[joint], 0)]", "PB-LINE-012"),
     ],
 )  # fmt: skip
 def test_lines_of_kinematics_are_named(program, method, right, wrong, code):

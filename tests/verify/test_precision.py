@@ -89,19 +89,10 @@ PRINTERS = {
 }
 
 
-def of_each_task(printers, quick=()):
-    """Parametrise over tasks and printers; steps take seconds and run by default with some."""
-    return pytest.mark.parametrize(
-        ("task", "printer"),
-        [
-            pytest.param(
-                task, printer,
-                marks=pytest.mark.slow if task == "mass_spring_step" and printer not in quick
-                else (),
-            )
-            for task in TASKS for printer in printers
-        ],
-    )  # fmt: skip
+def of_each_task(printers):
+    """Parametrise over tasks and printers."""
+    pairs = [(task, printer) for task in TASKS for printer in printers]
+    return pytest.mark.parametrize(("task", "printer"), pairs)
 
 
 def contestant(task, function, rounded=np.asarray, **greeting):
@@ -115,7 +106,8 @@ def judged(*arguments, **greeting):
     return verify(contestant(*arguments, **greeting)).tasks[0]
 
 
-@of_each_task(PRINTERS, ("float", "cout"))
+@pytest.mark.sample(every=3)
+@of_each_task(PRINTERS)
 def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     rounded, words = PRINTERS[printer]
     report = judged(task, TASKS[task][0](None), rounded)
@@ -125,7 +117,8 @@ def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     assert report.diagnosis.explanations == ()
 
 
-@of_each_task(["float", "float, nine digits", "cout", "to_string"], ("cout",))
+@pytest.mark.sample(every=4)
+@of_each_task(["float", "float, nine digits", "cout", "to_string"])
 def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
     make, key, _ = TASKS[task]
     rounded, words = PRINTERS[printer]
@@ -156,7 +149,9 @@ def few_variants(monkeypatch):
     monkeypatch.setattr(search, "MAX_FAULTS", 0)
 
 
+@pytest.mark.sample(without=["inverse"])
 @of_each_task(["float", "cout"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_one_answer_of_few_digits_excuses_nothing(task, printer, few_variants):
     make, rounded = TASKS[task][0](None), PRINTERS[printer][0]
     asked = []
@@ -170,6 +165,7 @@ def test_one_answer_of_few_digits_excuses_nothing(task, printer, few_variants):
     assert report.verdict is Verdict.WRONG
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_fault_as_small_as_single_precision_in_some_cases_is_no_precision(few_variants):
     right = forward_kinematics(None)
 
@@ -182,13 +178,10 @@ def test_a_fault_as_small_as_single_precision_in_some_cases_is_no_precision(few_
     assert report.verdict is Verdict.WRONG
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("task", "is_right"),
-    [(task, True) for task in TASKS]
-    + [
-        pytest.param(task, False, marks=[pytest.mark.slow] * task.startswith("mass_spring"))
-        for task in TASKS
-    ],
+    [(task, is_right) for is_right in (True, False) for task in TASKS],
 )
 def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hinted_at(
     task, is_right
@@ -215,6 +208,7 @@ def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hint
 
 
 @EACH_TASK
+@pytest.mark.usefixtures("verdict_alone")
 def test_declared_single_precision_is_right_without_a_word(task):
     report = judged(task, TASKS[task][0](None), as_float, precision="single")
     assert not report.assumptions
@@ -231,6 +225,7 @@ def test_several_answers_of_many_digits_are_in_double_precision(digits, is_doubl
     assert has_double(TaskReport("mass_spring_step", "", judgements, Diagnosis())) is is_double
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_residual_in_single_precision_is_no_evidence():
     right = ccd(None)
 

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from plumbob.verify.fault_programs import coded_faults, contestant_of
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
@@ -20,12 +19,6 @@ from plumbob.verify.verify import verify
 
 GREETING = Greeting(PROTOCOL, (TASK,))
 CASES = cases(GREETING, "", 0, False)
-# Without those of a changed line, which count where the catalogue knows no mistake.
-PROGRAMS = {
-    fault.name: fault
-    for fault in coded_faults().values()
-    if fault.task == TASK and fault.family != "LINE"
-}
 
 
 def world(inputs):
@@ -54,15 +47,7 @@ def test_every_convention_is_right_and_reported(name):
     assert report.diagnosis.behaviour.values == {"convention": name}
 
 
-# Every tenth program is judged quickly; test_fault_codes judges all of them.
-@pytest.mark.parametrize("name", list(PROGRAMS)[::10])
-def test_a_fault_is_named_by_its_code(name):
-    report = verify(contestant_of(PROGRAMS[name].wrong_program)).tasks[0]
-    assert report.verdict is Verdict.WRONG
-    assert [one.faults for one in report.diagnosis.explanations] == [(name,)]
-    assert PROGRAMS[name].code in str(report.diagnosis.explanations[0].sentence.values)
-
-
+@pytest.mark.slow
 def test_a_fault_is_named_in_another_convention():
     fault, spatial = FAULTS["origins not rotated"], CONVENTIONS["spatial, angular part first"]
 
@@ -74,18 +59,23 @@ def test_a_fault_is_named_in_another_convention():
     assert explanation.faults == ("origins not rotated",)
 
 
+@pytest.mark.slow
 def test_an_unknown_mistake_is_wrong_but_has_no_name():
     report = report_of(lambda inputs: 1.01 * world(inputs))
     assert report.verdict is Verdict.WRONG
     assert not report.diagnosis.explanations
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_conventions_are_not_to_change_between_answers():
     conventions = list(CONVENTIONS.values())
     report = report_of(lambda inputs: right_jacobian(inputs, conventions[len(inputs["q"]) % 2]))
     assert report.verdict is Verdict.WRONG
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_numbers_are_finite_and_single_precision_is_enough():
     assert (
         report_of(lambda inputs: np.full((6, len(inputs["q"])), np.nan)).verdict is Verdict.BROKEN
@@ -94,6 +84,8 @@ def test_numbers_are_finite_and_single_precision_is_enough():
     assert single.verdict is Verdict.RIGHT_EXCEPT
 
 
+@pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_transposed_jacobian_has_another_shape():
     report = report_of(lambda inputs: world(inputs).T)
     assert report.verdict is Verdict.BROKEN

@@ -97,7 +97,8 @@ def test_global_rotations_that_are_kept_give_the_same_pose(method):
         assert rotation.angle(local, kept) == pytest.approx(0.0, abs=1e-12)
 
 
-@pytest.mark.parametrize("rule", [1, 3, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 4))])
+@pytest.mark.sample("1", "3")
+@pytest.mark.parametrize("rule", [1, 2, 3, 4])
 def test_a_right_fabrik_of_any_rule_is_not_accused(rule):
     function = fabrik(Switches(rule=rule), ("local_rotations",))
     report = judged(INVERSE, function, "fabrik")
@@ -112,34 +113,34 @@ SWEPT = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param(fault, id=fault.key, marks=() if n % 30 == 15 else pytest.mark.slow)
-        for n, fault in enumerate(SWEPT)
-    ],
-)
-def test_a_fault_of_fabrik_is_named_by_another_rule(fault):
+# The default run takes the first of the parts, each every PARTS-th fault.
+PARTS = 40
+
+
+@pytest.mark.sample(every=PARTS)
+@pytest.mark.parametrize("part", range(PARTS))
+def test_a_fault_of_fabrik_is_named_by_another_rule(part):
     """Faults of points show in points; those of rotations by the rule that the program has."""
-    rule = 3 if fault.switch == "rotations" and fault.number != 9 else 1
-    function = fabrik(switches([fault])._replace(rule=rule), ("local_rotations", "positions"))
-    assert fault.key in named(judged(INVERSE, function, "fabrik"))[0]
+    for fault in SWEPT[part::PARTS]:
+        rule = 3 if fault.switch == "rotations" and fault.number != 9 else 1
+        function = fabrik(switches([fault])._replace(rule=rule), ("local_rotations", "positions"))
+        assert fault.key in named(judged(INVERSE, function, "fabrik"))[0], fault.key
 
 
-@pytest.mark.parametrize(
-    "fault",
-    [
-        pytest.param(fault, id=fault.key, marks=() if n % 40 == 1 else pytest.mark.slow)
-        for n, fault in enumerate(SHARED)
-    ],
-)
+@pytest.mark.sample(every=37)  # a part of each method
 @pytest.mark.parametrize("method", ["forward", "ccd", "fabrik"])
-def test_a_fault_of_quaternions_is_named_in_every_grouping(method, fault):
+@pytest.mark.parametrize("part", range(PARTS))
+def test_a_fault_of_quaternions_is_named_in_every_grouping(method, part):
+    for fault in SHARED[part::PARTS]:
+        assert is_named_in_another_grouping(method, fault), fault.key
+
+
+def is_named_in_another_grouping(method, fault):
     choices = {"rotating": 2, "grouping": 1, "unit": 1 if fault.part == "quaternion" else 0}
     choices |= {"rule": 3, "unit": 0 if method == "forward" else choices["unit"]}
     switched = switches([fault])._replace(**choices)
     if method == "forward" and fault.part == "arc":
-        return  # no arcs there
+        return True  # no arcs there
 
     def forward(**inputs):
         return predict_forward(switched, problems.Case("", FORWARD, inputs, "", None))
@@ -149,7 +150,7 @@ def test_a_fault_of_quaternions_is_named_in_every_grouping(method, fault):
         return {"local_rotations": local, "positions": positions}
 
     report = judged(FORWARD, forward) if method == "forward" else judged(INVERSE, inverse, method)
-    assert fault.key in named(report)[0]
+    return fault.key in named(report)[0]
 
 
 def test_every_shared_fault_is_a_fault_of_all_methods():

@@ -7,6 +7,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from functools import cache
 from pathlib import Path
 
 import msgspec
@@ -20,12 +21,20 @@ from plumbob.verify.message import encode_case
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
 
-ROBOT = next(iter(robot_targets.cases(Greeting(PROTOCOL, ()), "", 0, False)))
-JACOBIAN = next(iter(robot_jacobian.cases(Greeting(PROTOCOL, ()), "", 0, False)))
-REQUESTS = [
-    *planted_programs.requests(),
-    *(json.loads(encode_case(1000 + i, case)) for i, case in enumerate((ROBOT, JACOBIAN))),
-]
+
+@cache
+def robot_case():
+    return next(iter(robot_targets.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+
+
+@cache
+def all_requests():
+    """Return requests of every task that a starter offers."""
+    jacobian = next(iter(robot_jacobian.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+    robots = (json.loads(encode_case(1000 + i, c)) for i, c in enumerate((robot_case(), jacobian)))
+    return [*planted_programs.requests(), *robots]
+
+
 OFFERED = [
     "forward_kinematics", "inverse_kinematics", "mass_spring_step",
     "robot_inverse_kinematics", "robot_jacobian",
@@ -114,7 +123,7 @@ def language(request):
 @pytest.fixture(scope="module")
 def replies(language, tmp_path_factory):
     folder = tmp_path_factory.mktemp(language)
-    return ask(build(language, folder), folder, REQUESTS)[0]
+    return ask(build(language, folder), folder, all_requests())[0]
 
 
 def test_starter_greets_and_fails_only_where_code_is_missing(replies):
@@ -124,7 +133,7 @@ def test_starter_greets_and_fails_only_where_code_is_missing(replies):
     assert set(OFFERED) <= set(TASKS)
     assert greeting.language
     assert greeting.precision == "double"
-    for request, reply in zip(REQUESTS, replies, strict=True):
+    for request, reply in zip(all_requests(), replies, strict=True):
         assert reply["id"] == request["id"]
         if request["task"] in OFFERED:
             expected = f"{request['task']} is not written yet"
@@ -145,8 +154,8 @@ def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(langu
         "local_rotations": [[0.6, 0, 0.8, 0]],
     }
     request = {"id": 7, "task": "forward_kinematics", **pose}
-    (reply, of_robot), printed = ask(run, tmp_path, [request, REQUESTS[-2]])
-    assert of_robot["q"] == ROBOT.inputs["start"].tolist()
+    (reply, of_robot), printed = ask(run, tmp_path, [request, all_requests()[-2]])
+    assert of_robot["q"] == robot_case().inputs["start"].tolist()
     assert reply["positions"] == pose["offsets"]  # to the last digit
     assert reply["rotations"] == pose["local_rotations"]
     assert "stray" in printed

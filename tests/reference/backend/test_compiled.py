@@ -9,6 +9,8 @@ import pytest
 
 from plumbob.reference.backend import compiled
 
+pytestmark = pytest.mark.both_backends
+
 FACTOR = 3.0
 
 

@@ -6,6 +6,8 @@ import subprocess
 import sys
 import textwrap
 
+import pytest
+
 CALLER = textwrap.dedent("""
     import numpy as np
     from shapes import Disc
@@ -58,6 +60,7 @@ FAULTS = {
 DAMAGES = [(fault, kind) for fault in FAULTS for kind in ("nbi", "nbc")]
 
 
+@pytest.mark.slow
 def test_damaged_files_are_compiled_anew_and_whole_ones_used(tmp_path):
     """One caller for each damage, and one left whole."""
     count = len(DAMAGES) + 1
@@ -69,6 +72,7 @@ def test_damaged_files_are_compiled_anew_and_whole_ones_used(tmp_path):
     assert run(folder, count) == [CACHED] * count
 
 
+@pytest.mark.slow
 def test_a_cache_that_names_a_class_that_has_moved_is_renewed(tmp_path):
     """Numba pickles the types of arguments into its index."""
     folder = callers(tmp_path, 1)
@@ -79,6 +83,7 @@ def test_a_cache_that_names_a_class_that_has_moved_is_renewed(tmp_path):
     assert run(folder) == [CACHED]
 
 
+@pytest.mark.slow
 def test_a_kernel_runs_where_nothing_can_be_saved(tmp_path):
     """Files stand where numba would make a folder."""
     folder = callers(tmp_path, 1)

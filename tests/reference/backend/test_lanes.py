@@ -24,6 +24,8 @@ from plumbob.reference.quaternion import (
     subtract,
 )
 
+pytestmark = pytest.mark.both_backends
+
 JOINTS = 3
 
 

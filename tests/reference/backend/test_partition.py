@@ -8,6 +8,8 @@ from plumbob.reference.backend.partition import partition_springs
 from plumbob.reference.backend.threads import set_num_threads
 from plumbob.reference.implicit_euler.objective import Objective
 
+pytestmark = pytest.mark.both_backends
+
 H = 1 / 30
 EPS = np.finfo(float).eps
 

@@ -35,9 +35,10 @@ def model_of(skeleton, kind, axes=(0.0, 0.0, 1.0)):
 DIRECTIONS = [np.array([1.0, 0.0, 0.0]), np.array([0.6, 0.48, 0.64])]
 
 
+@pytest.mark.sample(every=3)
 @pytest.mark.parametrize("direction", DIRECTIONS, ids=["axis", "oblique"])
 @pytest.mark.parametrize("kind", ["skeleton", "ball", "hinge"])
-@pytest.mark.parametrize("height", [-3.0, -2.0, -0.3, 0.0, 0.5, 1.0, 2.0, 2.5, 3.8])
+@pytest.mark.parametrize("height", [-3.0, -0.3, 0.0, 2.0, 3.8])
 def test_a_straight_chain_is_freed_from_a_target_on_its_own_line(direction, kind, height, solver):
     """Four links of a metre; hinges rotate about an axis across them."""
     if solver == "fabrik" and kind == "hinge":
@@ -73,6 +74,7 @@ def test_a_stuck_start_is_not_given_up_for_something_worse(solver, backend):
         assert solution.outcome is Outcome.STALLED
 
 
+@pytest.mark.sample(every=3)
 @pytest.mark.parametrize("where", ["root", "effector", "reach", "beyond"])
 @pytest.mark.parametrize("kind", ["ball", "hinge", "slide", "free"])
 @pytest.mark.parametrize("oriented", [False, True])

@@ -1,4 +1,5 @@
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,6 +11,8 @@ from plumbob.reference.inverse_kinematics.jacobian_methods import (
     task_matrix,
     times,
 )
+
+pytestmark = pytest.mark.both_backends
 
 entries = st.floats(-1.0, 1.0)
 

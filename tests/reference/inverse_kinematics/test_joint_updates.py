@@ -25,6 +25,8 @@ from plumbob.reference.inverse_kinematics.fabrik import (
 from plumbob.reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from plumbob.reference.inverse_kinematics.reduce import prepare
 
+pytestmark = pytest.mark.both_backends
+
 # Squared distances of a few metres, and quaternions normalised after a rotation.
 ROUNDING = 1e-12
 

@@ -17,6 +17,8 @@ from plumbob.reference.sparse.linear_solver import factorize
 from plumbob.reference.sparse.multifrontal import PANEL, STRIP, eliminate
 from plumbob.reference.sparse.triangular import NEAR
 
+pytestmark = pytest.mark.both_backends
+
 EPS = np.finfo(float).eps
 
 
