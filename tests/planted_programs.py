@@ -1,4 +1,4 @@
-"""Right programs in C++, JavaScript and Python, what is planted in them, and how to ask them.
+"""Right programs in C++ and JavaScript, what is planted in them, and how to ask them.
 
 They were written from the lab's mathematics, independently of `reference/`; `programs/faults.toml`
 lists their faults.
@@ -7,7 +7,6 @@ lists their faults.
 import json
 import shutil
 import subprocess
-import sys
 import tomllib
 from pathlib import Path
 
@@ -25,7 +24,7 @@ MOTION = "mass_spring_motion"
 FAULTS = tomllib.loads((ROOM / "faults.toml").read_text(encoding="utf-8"))
 IN = {
     language: [key for key, fault in FAULTS.items() if language in fault["languages"]]
-    for language in ("cpp", "javascript", "python")
+    for language in ("cpp", "javascript")
 }
 # What makes a program of each source, if anything, and what has to be installed.
 COMPILERS = {
@@ -36,8 +35,6 @@ COMPILERS = {
 
 def command(language, folder):
     """Compile a program if needed; return what runs it, or None without a compiler."""
-    if language == "python":
-        return [sys.executable, str(ROOM / "solver.py")]
     if language == "javascript":
         node = shutil.which("node")
         return node and [node, str(ROOM / "solver.js")]

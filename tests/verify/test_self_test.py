@@ -42,10 +42,10 @@ def failed(chosen):
     return [trial for trial in map(attempt, chosen) if not trial.passed]
 
 
-@pytest.mark.parametrize("number", range(12))
+@pytest.mark.parametrize("number", range(8))
 def test_a_sample_of_faults_is_caught_and_named(number):
-    """Every 130th subject: the list goes through all families."""
-    assert not failed([all_subjects()[130 * number]])
+    """Every 190th subject: the list goes through all families."""
+    assert not failed([all_subjects()[190 * number]])
 
 
 PARTS = 60
