@@ -107,11 +107,13 @@ def has(item, texts):
 
 
 def sampled(cases, *texts, without=(), every=1):
-    """Return the cases that the mark `sample` leaves to the default run."""
+    """Return the cases that the mark `sample` leaves to the default run; some there have to be."""
     absent = [text for text in (*texts, *without) if not any(has(item, [text]) for item in cases)]
     if absent and len(cases) > 1:
         raise pytest.UsageError(f"{cases[0].nodeid}: sample: no case has the name {absent[0]!r}")
     chosen = [item for item in cases if has(item, texts or [""]) and not has(item, without)]
+    if not chosen and len(cases) > 1:
+        raise pytest.UsageError(f"{cases[0].nodeid}: sample: no case is left")
     return chosen[::every]
 
 

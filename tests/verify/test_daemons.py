@@ -72,7 +72,7 @@ def test_the_memory_of_a_daemon_counts(tmp_path):
     assert not running(tmp_path)
 
 
-@pytest.mark.sample(without=["verify", "bench"])
+@pytest.mark.slow
 @LINUX_ONLY
 @pytest.mark.parametrize(
     "words",

@@ -45,6 +45,7 @@ LINES = {fault.name: fault for fault in coded_faults().values() if fault.family 
 
 @pytest.mark.sample("order", "condition")  # the programs of the others take long
 @pytest.mark.parametrize("name", LINES)
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_changed_line_is_named(name, monkeypatch):
     fault = LINES[name]
     monkeypatch.setattr(search, "SELF_NAMED", FAMILIES)  # lines that are known faults as well
@@ -53,6 +54,7 @@ def test_a_changed_line_is_named(name, monkeypatch):
     assert explanation.share == 1.0
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_known_fault_of_another_program_is_named():
     fault = coded_faults()["PB-LIMIT-010"]
     source = source_of("hinges and cones").replace(*fault.lines[0])
@@ -124,6 +126,7 @@ SCREWS = [
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("right", "wrong", "words"), SCREWS)
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_line_of_screws_is_named_whichever_part_comes_first(right, wrong, words):
     source = source_of("Jacobian of the tool by screws").replace(right, wrong)
     source = source.replace('"jacobian": ', '"jacobian": np.roll(np.eye(6), 3, axis=0) @ ')
@@ -137,6 +140,7 @@ def test_a_line_of_screws_is_named_whichever_part_comes_first(right, wrong, word
     ["Jacobian by screws", "Jacobian of the tool by screws",
      "Jacobian of the tool's origin by screws"],
 )  # fmt: skip
+@pytest.mark.usefixtures("verdict_alone")
 def test_programs_of_screws_are_right(program):
     report, _ = report_on(source_of(program), "robot_jacobian")
     assert report.verdict is Verdict.RIGHT
@@ -157,6 +161,7 @@ def test_neighbours_in_a_list_change_places():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_another_line_that_gives_the_same_answers_is_named_as_well():
     """The sign of all positions may be lost in the adjoint, or where exponentials are computed."""
     source = source_of("Jacobian by screws").replace("hat(p) @ R", "-hat(p) @ R")
@@ -167,6 +172,7 @@ def test_another_line_that_gives_the_same_answers_is_named_as_well():
 
 
 @pytest.mark.parametrize("program", ["energy in loops", "forces term by term"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_right_answers_need_no_changed_line(program):
     task = "energy" if program.startswith("energy") else "mass_spring_forces"
     assert changed_lines(source_of(program), task) == ()
@@ -193,6 +199,7 @@ def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
 
 
 @pytest.mark.parametrize(("share", "is_named"), [(0.75, True), (0.74, False)])
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_changed_line_has_to_give_three_quarters_of_the_answers(share, is_named, monkeypatch):
     explanation = Explanation(("a line",), sentence("It is wrong."), share, 0.0)
     monkeypatch.setattr(search, "_of_program", lambda *arguments: (explanation,))
@@ -201,6 +208,7 @@ def test_a_changed_line_has_to_give_three_quarters_of_the_answers(share, is_name
     assert changed_lines(wrong, "energy") == ((explanation,) if is_named else ())
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_answers_of_a_right_program_speak_for_no_change():
     """A line that may be left out without effect would explain all answers."""
     report, greeting = report_on(source_of("energy in loops"), "energy")
@@ -214,6 +222,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
 
 @pytest.mark.sample(without=["0.0"])
 @pytest.mark.parametrize("factor", [0.0, 1.0])
+@pytest.mark.usefixtures("verdict_alone")
 def test_answers_that_repeat_the_request_tell_nothing(factor):
     """Many lines may be missing where nothing is computed."""
     source = source_of("newton step").replace(
@@ -223,6 +232,7 @@ def test_answers_that_repeat_the_request_tell_nothing(factor):
     assert changed_lines(source, "mass_spring_step") == ()
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_second_mistake_makes_no_line_likely():
     source = source_of("energy in loops")
     source = source.replace("- rest_lengths[s]", "- stiffnesses[s]").replace("0.5 * st", "0.3 * st")
@@ -277,6 +287,7 @@ def test_long_lines_are_cut_to_what_differs():
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("verdict_alone")
 def test_poses_are_compared_as_the_laws_read_them():
     """Rotations of a joint that move nothing, and the sign of a quaternion, are a free choice."""
     fault = coded_faults()["PB-CCD-003"]
@@ -307,6 +318,7 @@ def test_poses_are_compared_as_the_laws_read_them():
          "between(x[effector] - x[max(parents[joint], 0)]", "PB-LINE-012"),
     ],
 )  # fmt: skip
+@pytest.mark.usefixtures("verdict_alone")
 def test_lines_of_kinematics_are_named(program, method, right, wrong, code):
     """Positions kept by a scene graph, limits of joints, Euler angles and resampling in loops."""
     source = source_of(program)
