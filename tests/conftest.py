@@ -91,6 +91,17 @@ SAMPLED = {
 }
 
 
+def pytest_generate_tests(metafunc):
+    """Make the cases of a sweep: all of them for the slow tests, else only the quick ones."""
+    for mark in metafunc.definition.iter_markers("sweep"):
+        argument, names = mark.args[0], list(mark.args[1]())
+        quick = names[:: mark.kwargs["every"]]
+        if metafunc.config.option.markexpr == "not slow":
+            names = quick
+        slow = dict.fromkeys(set(names) - set(quick), pytest.mark.slow)
+        metafunc.parametrize(argument, [pytest.param(n, marks=slow.get(n, ())) for n in names])
+
+
 def cases_of(items):
     """Return the cases of each test that are not slow, with the test's mark `sample`."""
     cases = {}

@@ -5,7 +5,6 @@ import re
 import subprocess
 import sys
 import tomllib
-from functools import cache
 from itertools import groupby
 from pathlib import Path
 
@@ -139,10 +138,9 @@ BY_LINES = (
 SELF_TESTED = ("LIMIT", "ROBOT", "VELOCITY")
 
 
-@cache
-def faults_with_programs():
+def codes_with_programs():
     return [
-        fault
+        fault.code
         for fault in coded_faults().values()
         if fault.family not in ("LINE", *SELF_TESTED) and fault.code not in BY_LINES
     ]
@@ -172,33 +170,16 @@ EQUAL = {
 }  # fmt: skip
 
 
-def is_named_by_its_code(fault):
-    """Whether the program of a fault is not right, and a first explanation or hint has its code."""
+@pytest.mark.sweep("code", codes_with_programs, every=180)
+def test_a_wrong_program_is_named_by_its_code(code):
+    fault = coded_faults()[code]
     report = reports(fault.wrong_program, fault.task)
+    assert report.verdict > Verdict.RIGHT
     names = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
     names += report.diagnosis.hints
     if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
         names += [words for judgement in report.judgements for words in judgement.complaints]
-    code = EQUAL.get(fault.code, fault.code)
-    codes = {code for words in names for code in codes_in(words)}
-    return report.verdict > Verdict.RIGHT and code in codes
-
-
-@pytest.mark.parametrize("number", range(4))
-def test_a_sample_of_wrong_programs_is_named_by_their_codes(number):
-    """Every 180th fault: the list goes through all families."""
-    fault = faults_with_programs()[180 * number]
-    assert is_named_by_its_code(fault), fault.code
-
-
-PARTS = 60
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("part", range(PARTS))
-def test_every_wrong_program_is_named_by_its_code(part):
-    faults = faults_with_programs()[part::PARTS]
-    assert [fault.code for fault in faults if not is_named_by_its_code(fault)] == []
+    assert EQUAL.get(code, code) in {known for words in names for known in codes_in(words)}
 
 
 # What hides these from most laws: a claim that only few cases refute, pins that have no step, and
@@ -209,7 +190,7 @@ HIDDEN = ("PB-CLAIM-024", "PB-CLAIM-032", "PB-STEP-080", "PB-STEP-082")
 @pytest.mark.sample("CLAIM")
 @pytest.mark.parametrize("code", HIDDEN)
 def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
-    assert is_named_by_its_code(coded_faults()[code])
+    test_a_wrong_program_is_named_by_its_code(code)
 
 
 @pytest.mark.slow
@@ -217,7 +198,7 @@ def test_a_mistake_that_few_answers_show_is_named_by_its_code(code):
 def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch):
     module = sys.modules["plumbob.verify.verify"]
     monkeypatch.setattr(module, "with_changed_line", search.with_changed_line)
-    assert is_named_by_its_code(coded_faults()[code])
+    test_a_wrong_program_is_named_by_its_code(code)
 
 
 RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "task" in entry}

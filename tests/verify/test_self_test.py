@@ -33,42 +33,29 @@ def engines():
 
 
 @cache
-def all_subjects():
-    return [*subjects(), *engines()]
+def by_name():
+    """Return all subjects by their names, family after family."""
+    return {f"{one.family}, {one.name}, {one.task}": one for one in (*subjects(), *engines())}
 
 
-def failed(chosen):
-    """Return the trials of subjects that are not passed."""
-    return [trial for trial in map(attempt, chosen) if not trial.passed]
-
-
-@pytest.mark.parametrize("number", range(8))
-def test_a_sample_of_faults_is_caught_and_named(number):
-    """Every 190th subject: the list goes through all families."""
-    assert not failed([all_subjects()[190 * number]])
-
-
-PARTS = 60
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("part", range(PARTS))
-def test_every_fault_is_caught_and_named_and_every_honest_solver_is_right(part):
-    assert not failed(all_subjects()[part::PARTS])
+@pytest.mark.sweep("name", by_name, every=190)
+def test_fault_is_caught_and_named_and_honest_solver_is_right(name):
+    trial = attempt(by_name()[name])
+    assert trial.passed, (trial.verdict, trial.laws, trial.named)
 
 
 def test_every_family_has_subjects_with_names_of_their_own():
-    assert len({(one.family, one.name, one.task) for one in all_subjects()}) == len(all_subjects())
-    assert {one.family for one in all_subjects() if not one.fault} == {HONEST}
-    faulty = [subject for subject in all_subjects() if subject.fault]
+    assert len(by_name()) == len([*subjects(), *engines()])
+    assert {one.family for one in by_name().values() if not one.fault} == {HONEST}
+    faulty = [subject for subject in by_name().values() if subject.fault]
     assert len(faulty) >= 1227
     families = "robots", "steps", "forces", "limits", "forward kinematics", "CCD", "FABRIK"
     assert {one.family for one in faulty} == set(families)
 
 
 def test_judge_that_misses_a_fault_or_accuses_an_honest_solver_does_not_pass():
-    fault = next(subject for subject in all_subjects() if subject.fault)
-    honest = next(subject for subject in all_subjects() if not subject.fault)
+    fault = next(subject for subject in by_name().values() if subject.fault)
+    honest = next(subject for subject in by_name().values() if not subject.fault)
     positions = frozenset({"positions"})
     missed = Trial(fault, Verdict.RIGHT, frozenset(), True)
     accepted = Trial(honest, Verdict.RIGHT, frozenset(), True)
