@@ -44,6 +44,7 @@ def change(request, network, altered):
     }[request.param]
 
 
+@pytest.mark.sample(every=3)
 @pytest.mark.parametrize("solver", STEP_SOLVERS)
 def test_a_change_between_steps_gives_what_a_fresh_integrator_gives(network, change, solver):
     before = ImplicitEuler(network[0], h=h, solver=solver)

@@ -104,6 +104,7 @@ SHARED = {
 }
 
 
+@pytest.mark.sample(every=4)
 @pytest.mark.parametrize("name", SHARED)
 def test_threads_that_share_an_object_get_the_answers_of_one_thread(name):
     answer, wrong = SHARED[name](), []

@@ -19,6 +19,7 @@ def arm():
     return scenes.lab_arm()[0]
 
 
+@pytest.mark.sample(every=5)
 @pytest.mark.parametrize("solver", IK_SOLVERS)
 @pytest.mark.parametrize("name", curves)
 @pytest.mark.parametrize("warm", [True, False])

@@ -268,7 +268,7 @@ class LocalGlobal:
         return x, (x - positions) / h if self.is_velocity_right else velocities + h * gravity
 
 
-@pytest.mark.sample(without=["1"])
+@pytest.mark.slow
 @pytest.mark.parametrize("iterations", [1, 100])
 @pytest.mark.parametrize("is_declared", [False, True])
 def test_a_wrong_velocity_is_named_whatever_the_iterations_leave(iterations, is_declared):

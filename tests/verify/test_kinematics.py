@@ -129,7 +129,7 @@ def test_pair_is_named(method, allowed):
     assert len(missed) <= allowed * len(chosen), missed
 
 
-@pytest.mark.sample(every=8)
+@pytest.mark.sample("frames start anew-ccd", "effector put on the target-ccd")
 @pytest.mark.parametrize(
     ("method", "fault"),
     [

@@ -262,6 +262,7 @@ def assert_outcomes_tell_a_minimum(model, parts, rng):
     return outcomes
 
 
+@pytest.mark.sample(every=3)
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("name", TASKS)
 def test_outcomes_tell_a_minimum_from_a_stop(name, exact):

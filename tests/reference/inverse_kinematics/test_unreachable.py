@@ -156,6 +156,7 @@ def nearest_by_scipy(model, position, rng):
     return float(np.sqrt(min(end.fun for end in ends)))
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("seed", range(2))
 def test_with_restarts_no_other_search_comes_nearer(seed):
     """Twenty restarts in at most 300 iterations each, where they took a thousand and more."""
@@ -284,6 +285,7 @@ def first_shell_gap(model, target):
     return max(r - shell.largest, shell.smallest - r), np.linalg.norm(arm)
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("kinds", KINDS)
 def test_what_the_first_shell_proves_is_unreachable(articulated, kinds):
     """And what a pose reaches is not, though the solve fails."""
