@@ -91,11 +91,16 @@ SAMPLED = {
 }
 
 
+def quick_names(names, every, without=()):
+    """Return names by position, of those without some texts."""
+    return [name for name in names if not any(text in name for text in without)][::every]
+
+
 def pytest_generate_tests(metafunc):
     """Make the cases of a sweep: all of them for the slow tests, else only the quick ones."""
     for mark in metafunc.definition.iter_markers("sweep"):
         argument, names = mark.args[0], list(mark.args[1]())
-        quick = names[:: mark.kwargs["every"]]
+        quick = quick_names(names, **mark.kwargs)
         if metafunc.config.option.markexpr == "not slow":
             names = quick
         slow = dict.fromkeys(set(names) - set(quick), pytest.mark.slow)

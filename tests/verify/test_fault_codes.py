@@ -170,7 +170,7 @@ EQUAL = {
 }  # fmt: skip
 
 
-@pytest.mark.sweep("code", codes_with_programs, every=180)
+@pytest.mark.sweep("code", codes_with_programs, without=["STEP"], every=140)
 def test_a_wrong_program_is_named_by_its_code(code):
     fault = coded_faults()[code]
     report = reports(fault.wrong_program, fault.task)

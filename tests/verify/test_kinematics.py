@@ -129,7 +129,7 @@ def test_pair_is_named(method, allowed):
     assert len(missed) <= allowed * len(chosen), missed
 
 
-@pytest.mark.sample("frames start anew-ccd", "effector put on the target-ccd")
+@pytest.mark.sample("frames start anew-ccd", "curve moved to the effector-ccd")
 @pytest.mark.parametrize(
     ("method", "fault"),
     [
@@ -572,7 +572,7 @@ def resampler(make):
     return function
 
 
-@pytest.mark.sample(every=15)
+@pytest.mark.sample("-0", every=5)
 @pytest.mark.parametrize(
     ("key", "number"),
     [(key, i) for key, choices in RESAMPLE_FAULTS.items() for i in range(len(choices))],
