@@ -92,7 +92,7 @@ SAMPLED = {
 
 
 def quick_names(names, every, without=()):
-    """Return names by position, of those without some texts."""
+    """Return each name of so many, of the names without some texts."""
     return [name for name in names if not any(text in name for text in without)][::every]
 
 
@@ -143,11 +143,11 @@ def is_plain(item):
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Mark as slow what the marks of tests leave to the heavy sweep."""
+    for item in filter(is_plain, items):
+        item.add_marker(pytest.mark.slow)
     for mark, cases in cases_of(items):
         for item in set(cases) - set(sampled(cases, *mark.args, **mark.kwargs)):
             item.add_marker(pytest.mark.slow)
-    for item in filter(is_plain, items):
-        item.add_marker(pytest.mark.slow)
     for name, stride in SAMPLED.items():
         quick = [i for i in items if name in i.nodeid and not i.get_closest_marker("slow")]
         for item in set(quick) - set(quick[::stride]):
