@@ -205,7 +205,7 @@ RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "ta
 RESERVED = ("robot", "robot_track")
 
 
-@pytest.mark.sample(every=13)
+@pytest.mark.sample(every=22)
 @pytest.mark.parametrize("name", RIGHT_PROGRAMS)
 def test_a_right_program_is_right(name):
     tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
