@@ -222,7 +222,7 @@ def test_what_is_counted_as_resting_on_an_engine_cannot_be_checked_without_it():
     assert 0 < count < len(claims)
     measured = {"cases": 1, "difference": 0.0, "tolerance": 1.0, "moved": 1.0, "holds": True}
     records = [
-        Record("check", c.name, c.counterpart, measured={**measured, "ours": c.quantity})
+        Record("check", c.name, c.counterpart, measured={**measured, "quantity": c.quantity})
         for c in claims
     ]
     assert verdicts(Results(records)).summary.sentence.startswith(
