@@ -14,7 +14,7 @@ from ..harness import metrics
 from ..harness.block import Block, Measured, Scale
 from ..harness.chain_targets import SolverLimits, blocks_of_users
 from ..harness.record import Record
-from ..harness.values import Floats1, Values
+from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.ik import toolbox, trac_ik
 from ..peers.peer import ONE_START, RESTARTS, Peer, Run
@@ -50,6 +50,15 @@ class FabrikSolves(FabrikWords, frozen=True):
 
     iterations: Floats1
     residual: Floats1
+    # Of a user's solver also the other numbers of `ChainSolves`.
+    distance: Floats1 | None = None
+    bend: Floats1 | None = None
+    excess: Floats1 | None = None
+    reach: float | None = None
+    solved: Booleans1 | None = None
+    claims: Integers1 | None = None
+    seconds: Floats2 | None = None
+    control: Floats1 | None = None
 
 
 KINDS = {TRAC_IK: RobotSolves, TOOLBOX: RobotSolves, FABRIK: FabrikSolves}
