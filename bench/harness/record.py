@@ -104,8 +104,12 @@ class Record:
         A record without numbers is read as the type above.
         """
         kind = kind_of(self.suite, self.task)
-        fields = {**self.settings, **self.measured}
-        return kind and values.read(kind if self.has_numbers else values.words_of(kind), fields)
+        if kind is None:
+            return None
+        arrays = values.array_names(kind)  # such as the times, where a time limit is a setting
+        settings = {name: v for name, v in self.settings.items() if name not in arrays}
+        type_read = kind if self.has_numbers else values.words_of(kind)
+        return values.read(type_read, {**settings, **self.measured})
 
     @functools.cached_property
     def has_numbers(self) -> bool:

@@ -64,6 +64,11 @@ def own_names(kind: type[Values]) -> set[str]:
     return _names(kind) - _names(words_of(kind))
 
 
+def array_names(kind: type[Values]) -> set[str]:
+    """Return the names of the fields that hold arrays."""
+    return {f.name for f in msgspec.structs.fields(kind) if np.ndarray.__name__ in str(f.type)}
+
+
 def words_of(kind: type[Values]) -> type[Values]:
     """Return the type of the words of a block: the type above."""
     above = kind.__base__

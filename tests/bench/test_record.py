@@ -323,6 +323,15 @@ def test_a_measurement_of_another_type_is_a_failure():
     assert not measure(replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT})).failed
 
 
+def test_a_setting_is_not_read_as_an_array_of_the_same_name():
+    """TRAC-IK has a time limit, `seconds`, and may have no times."""
+    measured = {"task": "reachable", "setup": 0.1, "solved": np.ones(2, dtype=bool)}
+    measured |= {"claims": np.ones(2, dtype=int), "stratum": np.zeros(2, dtype=int)}
+    measured |= dict.fromkeys(("position", "rotation", "beyond"), np.zeros(2))
+    record = Record("ik", "robots/ur5", "TRAC-IK", {"seconds": 0.005}, measured)
+    assert record.values.seconds is None
+
+
 def test_a_misspelt_number_or_word_is_a_failure():
     misspelt = replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT, "lift": 1.0})
     why = "ValueError: measured: expected values that Swing declares, got lift"
