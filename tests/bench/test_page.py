@@ -146,8 +146,8 @@ def address_of(browser):
 VISIBLE_WORDS = (
     r"document.body.innerText.split(/\s+/).filter(word => /[\p{L}\d]/u.test(word)).length"
 )
-# A full run with every peer has fewer than 2,500 on its page; the figures of this one are left out.
-MOST_WORDS = 2400
+# Numbers of the map count as words; the figures of this page are left out.
+MOST_WORDS = 2600
 
 
 @pytest.mark.parametrize("size", [DESK, PHONE], ids=["desk", "phone"])
@@ -192,7 +192,7 @@ def test_a_switch_shows_one_start_or_restarts_on_the_whole_page(table):
         click(table, f'[name=starts2][value="{value}"]')
         assert table.run("document.querySelector('[name=starts]:checked').value") == value
         (caption,) = texts(table, ".map caption")
-        assert caption.startswith(f"Poses solved on each robot [%], {value}")
+        assert caption.startswith(f"Targets solved [%], n = 120 on each robot, {value}")
         assert texts(table, f"figure.{other}") == []
         names = {entry.kind: [] for entry in ENTRIES}
         for peer in PRESENT:
@@ -200,7 +200,7 @@ def test_a_switch_shows_one_start_or_restarts_on_the_whole_page(table):
                 names[entry.kind].append(peer.label_of(entry))
         assert sorted(set(column(table, 3))) == sorted(names[value])
     click(table, "[value=time]")
-    assert "Median time of a pose solved [µs, 1k = 1,000]" in texts(table, ".map caption")[0]
+    assert "Time, geometric mean [µs], 100 ms where not solved" in texts(table, ".map caption")[0]
 
 
 def test_a_robot_of_the_map_leads_to_its_rows_the_best_first(browser):
@@ -210,7 +210,8 @@ def test_a_robot_of_the_map_leads_to_its_rows_the_best_first(browser):
     assert set(column(browser, 1)) == {"the UR5"}
     shares = [float(text.split()[0]) for text in column(browser, 4)]
     assert len(shares) == ONE_START
-    assert shares == sorted(shares, reverse=True)
+    ranked = shares[: -sum(peer.is_loop for peer in PRESENT)]  # our loops on other engines come last
+    assert ranked == sorted(ranked, reverse=True)
 
 
 def test_a_table_is_cut_until_all_rows_are_asked_for(browser):
