@@ -76,7 +76,7 @@ LONG = (
     "test_run.py::test_kills_at_random_moments_lose_nothing_finished_and_repeat_nothing",
     "test_show.py::test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean",
     "test_show.py::test_the_cloth_by_your_steps_is_as_far_off_as_it_is",
-    "test_tuning.py::test_an_interrupted_search_goes_on_and_a_lost_process_solves_nothing",
+    "test_tuning.py::test_an_interrupted_search_goes_on_and_wrong_settings_solve_nothing",
     "test_verify_command.py::test_full_disk_behind_the_screen_costs_no_file[right.py",
     "test_verify_command.py::test_full_disk_behind_the_screen_costs_no_file[wrong",
     "test_verify_command.py::test_letters_that_a_terminal_lacks_cost_no_output",

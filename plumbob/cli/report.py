@@ -42,7 +42,7 @@ def report(
         if folder and output:
             raise ValueError(f"--output: expected --table, or no folder but this; got {folder} too")
         return write_report(folder or output or REPORT)
-    tables = _tables(folder or REPORT)
+    tables = _tables(folder or (output if names else None) or REPORT)
     if not name:
         return _list_tables(tables)
     by_name = {table.name: table for table in tables}

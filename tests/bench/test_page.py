@@ -210,7 +210,9 @@ def test_a_robot_of_the_map_leads_to_its_rows_the_best_first(browser):
     assert set(column(browser, 1)) == {"the UR5"}
     shares = [float(text.split()[0]) for text in column(browser, 4)]
     assert len(shares) == ONE_START
-    ranked = shares[: -sum(peer.is_loop for peer in PRESENT)]  # our loops on other engines come last
+    ranked = shares[
+        : -sum(peer.is_loop for peer in PRESENT)
+    ]  # our loops on other engines come last
     assert ranked == sorted(ranked, reverse=True)
 
 
