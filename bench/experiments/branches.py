@@ -6,7 +6,8 @@ kinematics confirms each within the limits. Solutions that differ by whole revol
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from ..harness.record import Record
 from ..harness.values import Floats1, Integers1, Values
 from ..peers.axes import REVOLUTION, all_within
 from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
-from ..peers.peer import Peer
 from ..peers.protocol import Ask
 from ..problems.evaluate import Targets, angle_between, evaluator_of
 from ..problems.robot_targets import STRATA, robot_targets
@@ -83,28 +83,17 @@ def blocks(scale: Scale) -> Iterator[Block]:
             continue
         problem, facts = f"branches/{name}", {"task": BRANCHES, "title": title(name)}
         for peer in (peer for peer in BRANCH_SOLVERS if peer.is_installed):
-            job = BranchJob(name, peer, count, scale.seed)
             settings = {"version": peer.version, "starts": STARTS, "seed": scale.seed}
             solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
-            group, size = Group(problem, compare, job), count * len(STRATA)
-            measure = group.measure_alone
+            group = Group(problem, partial(compare, name, count, scale.seed), peer.module)
+            measure, size = group.measure_alone, count * len(STRATA)
             yield Block(SUITE, problem, solver, measure, settings, size, facts, group=group)
 
 
-class BranchJob(NamedTuple):
-    """Targets of a robot, and a solver to list their solutions."""
-
-    robot: str
-    peer: Peer
-    target_count: int  # of a stratum
-    seed: int
-
-
-def compare(jobs: Sequence[BranchJob]) -> list[Measured]:
-    """Compare the lists of solvers with each other and with the search."""
+def compare(name: str, count: int, seed: int, modules: Sequence[str]) -> list[Measured]:
+    """Compare the lists of the solvers of modules with each other and with the search."""
     announce("all solutions, every solver")
-    modules, job = [job.peer.module for job in jobs], jobs[0]
-    results = in_a_fresh_process(PATIENCE, lists, job.robot, modules, job.target_count, job.seed)
+    results = in_a_fresh_process(PATIENCE, lists, name, modules, count, seed)
     return [results[module] for module in modules]
 
 

@@ -54,28 +54,17 @@ def blocks(scale: Scale) -> Iterator[Block]:
             facts = {"task": ROBOT_TASK, "kind": kind}
             facts["title"] = f"{title(name)}, {ROBOT_TASKS[task].title}"
             settings = {"version": peer.version, "seed": scale.seed, "attempts": kind}
-            measure = partial(meet, TaskJob(name, task, peer, kind, count, scale.seed))
+            measure = partial(meet, name, task, peer, kind, count, scale.seed)
             solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
             yield Block(SUITE, f"{task}/{name}", solver, measure, settings, count, facts)
 
 
-class TaskJob(NamedTuple):
-    """Targets of a robot, and a solver."""
-
-    robot: str
-    task: str
-    peer: Peer
-    kind: str  # `ONE_START` or `RESTARTS`
-    target_count: int
-    seed: int
-
-
-def meet(job: TaskJob) -> Measured:
-    """Ask a solver for all targets; MuJoCo evaluates the answers."""
-    announce(f"{job.task}, {job.robot}, {job.peer.title}")
-    arm, task, entry = robot(job.robot), ROBOT_TASKS[job.task], job.peer.first(job.kind)
-    module, settings = importlib.import_module(job.peer.module), entry.settings
-    if job.peer is PLUMBOB_LM:
+def meet(name: str, task_name: str, peer: Peer, kind: str, count: int, seed: int) -> Measured:
+    """Ask a solver for all targets, from one start or with restarts; MuJoCo evaluates them."""
+    announce(f"{task_name}, {name}, {peer.title}")
+    arm, task, entry = robot(name), ROBOT_TASKS[task_name], peer.first(kind)
+    module, settings = importlib.import_module(peer.module), entry.settings
+    if peer is PLUMBOB_LM:
         settings = {"restarts": settings["restarts"]}
     try:
         ask = module.prepare_task(arm, task, TOLERANCE, **settings)
@@ -83,12 +72,12 @@ def meet(job: TaskJob) -> Measured:
         return {"remark": str(error)}
     if entry.restarts:
         ask = restarted(ask, arm, entry.restarts)
-    rng = np.random.default_rng([job.seed, seed_of(job.robot)])
-    pairs = (arm.draw(rng, job.target_count) for _ in range(2))
+    rng = np.random.default_rng([seed, seed_of(name)])
+    pairs = (arm.draw(rng, count) for _ in range(2))
     requests = [TaskRequest(goal, start) for goal, start in zip(*pairs, strict=True)]
     attempt(ask(requests[0]))  # whatever is loaded or compiled with the first call
     outputs = [attempt(ask(request)) for request in requests]
-    evaluator, no_answer = evaluator_of(job.robot), np.full(len(arm.lower), np.inf)
+    evaluator, no_answer = evaluator_of(name), np.full(len(arm.lower), np.inf)
     rows = [no_answer if output.q is None else output.q for output in outputs]
     solved = [
         bool(np.isfinite(q).all()) and is_met(evaluator, task, request, q, TOLERANCE)

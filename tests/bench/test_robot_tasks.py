@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from table_cells import column
 
-from plumbob.bench.experiments.robot_tasks import TOLERANCE, TaskJob, meet, robot_tasks
+from plumbob.bench.experiments.robot_tasks import TOLERANCE, meet, robot_tasks
 from plumbob.bench.peers.catalogue import PLUMBOB_LM, TASK_SOLVERS
 from plumbob.bench.peers.peer import ONE_START, RESTARTS
 from plumbob.bench.problems.evaluate import evaluator_of
@@ -57,7 +57,7 @@ def meet_part(task, request):
 def test_every_installed_solver_meets_tasks_with_restarts_or_says_why_not(name, peer):
     if not peer.is_installed:
         pytest.skip(f"{peer.package} is not installed")
-    measured = meet(TaskJob(ARM, name, peer, RESTARTS, 2, 1986))
+    measured = meet(ARM, name, peer, RESTARTS, 2, 1986)
     if "solved" not in measured:
         assert measured["remark"] == "has no task to look at a point"
         assert name == "look_at"
@@ -71,8 +71,8 @@ def test_every_installed_solver_meets_tasks_with_restarts_or_says_why_not(name, 
 def test_a_false_claim_is_not_counted_and_an_unable_solver_says_why(importable):
     importable("faulty_tasks", FAULTY)
     peer = dataclasses.replace(PLUMBOB_LM, module="faulty_tasks", title="faulty")
-    assert not meet(TaskJob(ARM, "axis", peer, ONE_START, 2, 1986))["solved"].any()
-    assert meet(TaskJob(ARM, "loop", peer, ONE_START, 2, 1986))["remark"] == "takes one part"
+    assert not meet(ARM, "axis", peer, ONE_START, 2, 1986)["solved"].any()
+    assert meet(ARM, "loop", peer, ONE_START, 2, 1986)["remark"] == "takes one part"
 
 
 def test_the_table_adds_up_the_robots(make):
