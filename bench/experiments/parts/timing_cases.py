@@ -264,11 +264,19 @@ def _solves(stratum: str, solver: str) -> TimedWork:
 def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
     """Return a call that solves the first targets, each by its own call."""
     problem = chain_targets(stratum, TARGETS)
-    pairs = list(zip(problem.starts[:count], problem.targets[:count], strict=True))
+    solve = partial(solve_ik, problem.skeleton, solver=solver, **LIMITS)
+    return one_by_one(solve, problem.starts[:count], problem.targets[:count])
+
+
+def one_by_one(
+    solve: Callable[..., Any], starts: FloatArray, targets: FloatArray
+) -> Callable[[], Any]:
+    """Return a call that solves each target from its start."""
+    pairs = list(zip(starts, targets, strict=True))
 
     def run() -> None:
         for start, target in pairs:
-            solve_ik(problem.skeleton, start, target, solver, **LIMITS)
+            solve(start, target)
 
     return run
 
@@ -276,14 +284,8 @@ def single_solves(stratum: str, solver: str, count: int) -> Callable[[], Any]:
 def prepared_solves(stratum: str, solver: str) -> Callable[[], Any]:
     """Return a call that solves all targets, each into the same arrays."""
     problem = chain_targets(stratum, TARGETS)
-    pairs = list(zip(problem.starts, problem.targets, strict=True))
     solve = prepare_ik(problem.skeleton, solver, **LIMITS)
-
-    def run() -> None:
-        for start, target in pairs:
-            solve(start, target)
-
-    return run
+    return one_by_one(solve, problem.starts, problem.targets)
 
 
 def batch_solve(stratum: str, solver: str) -> Callable[[], Any]:
@@ -297,14 +299,9 @@ def loop_solves(stratum: str, name: str) -> Callable[[], Any]:
     """Return a call that solves all targets by Levenberg-Marquardt on named kinematics."""
     problem = chain_targets(stratum, TARGETS)
     engine: Any = KINEMATICS[name](problem.skeleton)
-    starts = coordinates(engine, problem.starts)
-    effector = problem.skeleton.joint_count - 1
-
-    def run() -> None:
-        for q, target in zip(starts, problem.targets, strict=True):
-            levenberg_marquardt(engine, q, target, effector, **LIMITS)
-
-    return run
+    limits = {"effector": problem.skeleton.joint_count - 1, **LIMITS}
+    solve = partial(levenberg_marquardt, engine, **limits)
+    return one_by_one(solve, coordinates(engine, problem.starts), problem.targets)
 
 
 def cloth_cases() -> Iterator[TimedCase]:
