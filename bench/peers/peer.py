@@ -2,7 +2,7 @@
 
 import importlib.metadata
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 from .entrant import Entrant
@@ -68,24 +68,17 @@ class Peer:
     algorithm: str
     can: str  # what it solves
     runs: tuple[Run, ...]
-    # its name as written, if not its title
-    label: str = field(default="", kw_only=True)
-    # its engine, if not its package
-    engine: str = field(default="", kw_only=True)
-    # its colour in figures, by its name in `bench.figures.style`; "" for any
-    colour: str = field(default="", kw_only=True)
+    _: KW_ONLY
+    label: str = ""  # its name as written, if not its title
+    engine: str = ""  # its engine, if not its package
+    colour: str = ""  # its colour in figures, by its name in `bench.figures.style`; "" for any
     # the engine whose kinematics it works with, which never evaluates its answers
-    built_on: str = field(default="", kw_only=True)
-    # the reason to choose this peer, which ends the sentence "choose it for"
-    use: str = field(default="", kw_only=True)
-    # the precision of its kinematics, if not double
-    precision: str = field(default="", kw_only=True)
-    # whether it is a Python loop of ours on the package's kinematics
-    is_loop: bool = field(default=False, kw_only=True)
-    # an environment of its own with its own Python; "" for a solver in ours
-    environment: str = field(default="", kw_only=True)
-    # the user's solver, if any, which is always there
-    entrant: Entrant | None = field(default=None, kw_only=True)
+    built_on: str = ""
+    use: str = ""  # the reason to choose this peer, which ends the sentence "choose it for"
+    precision: str = ""  # the precision of its kinematics, if not double
+    is_loop: bool = False  # whether it is a Python loop of ours on the package's kinematics
+    environment: str = ""  # an environment of its own with its own Python; "" for a solver in ours
+    entrant: Entrant | None = None  # the user's solver, if any, which is always there
 
     @property
     def name(self) -> str:
