@@ -6,8 +6,10 @@ from datetime import UTC, datetime
 
 from ..peers.protocol import describe
 from .block import Block, Measured
+from .experiment import kind_of
 from .machine import conditions, stamp
 from .record import Key, Record, key
+from .values import check_names
 
 
 def block_key(block: Block) -> Key:
@@ -48,7 +50,8 @@ def _checked(block: Block, measured: Measured, seconds: float) -> Record:
     record = record_of(block, measured, seconds)
     try:
         record.check()
-        record.check_names()
+        if kind := kind_of(record.suite, record.task):
+            check_names(kind, record.measured)
     except ValueError as error:
         return record_of(block, failure(describe(error)), seconds)
     return record

@@ -147,15 +147,6 @@ class Record:
         if not self.superseded:
             self.values  # noqa: B018
 
-    def check_names(self) -> None:
-        """Check that all measured values are declared by the experiment.
-
-        Raises:
-            ValueError: naming those that are not.
-        """
-        if kind := kind_of(self.suite, self.task):
-            values.check_names(kind, self.measured)
-
     @property
     def task(self) -> str:
         """The kind of its numbers among the kinds of its suite, "" if there is a single kind."""
