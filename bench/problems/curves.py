@@ -47,18 +47,18 @@ class FollowedCurve:
 
 def arm_curves() -> list[FollowedCurve]:
     """Return the arm with every named curve, the custom curve resampled evenly."""
-    skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](frames) for name, frames in FRAMES.items()}
     drawn[CUSTOM] = evened_custom_curve()
+    return _of_arm(drawn)
+
+
+def _of_arm(drawn: dict[str, FloatArray], before: str = "") -> list[FollowedCurve]:
+    """Return the lab's arm with curves by their names; words before a name begin its title."""
+    skeleton, rest = scenes.lab_arm()
     return [
-        FollowedCurve(f"arm/{name}", spaced(name), skeleton, rest, curve)
+        FollowedCurve(f"arm/{name}", before + name.replace("_", " "), skeleton, rest, curve)
         for name, curve in drawn.items()
     ]
-
-
-def spaced(name: str) -> str:
-    """Return how the name of a curve is written."""
-    return name.replace("_", " ")
 
 
 def custom_curve() -> FloatArray:
@@ -66,9 +66,10 @@ def custom_curve() -> FloatArray:
     return curves[CUSTOM](CUSTOM_SAMPLES)
 
 
-def evened_custom_curve() -> FloatArray:
+def evened_custom_curve(closed: bool = False) -> FloatArray:
     """Return the custom curve resampled between the two spacings [m], (frame, 3)."""
-    return resample(custom_curve(), min_spacing=MIN_SPACING, max_spacing=MAX_SPACING)
+    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
+    return resample(custom_curve(), closed=closed, **spacing)
 
 
 def arm_beyond(count: int) -> TargetsForSkeleton:
@@ -83,14 +84,9 @@ def arm_beyond(count: int) -> TargetsForSkeleton:
 @functools.cache
 def arm_closed_curves() -> Sequence[FollowedCurve]:
     """Return the lab's arm on the lab's curves, the custom curve resampled and closed."""
-    skeleton, rest = scenes.lab_arm()
     drawn = {name: curves[name](FRAMES[name]) for name in ARM_CURVES}
-    spacing = {"min_spacing": MIN_SPACING, "max_spacing": MAX_SPACING}
-    drawn[CUSTOM] = resample(custom_curve(), closed=True, **spacing)
-    return [
-        FollowedCurve(f"arm/{name}", f"arm, {spaced(name)}", skeleton, rest, curve)
-        for name, curve in drawn.items()
-    ]
+    drawn[CUSTOM] = evened_custom_curve(closed=True)
+    return _of_arm(drawn, "arm, ")
 
 
 def robot_closed_curves() -> list[FollowedCurve]:
