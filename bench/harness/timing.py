@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import clock
+from ..peers.contestant import remark
 from ..peers.protocol import (
     Ask,
     BenchRobot,
@@ -29,7 +30,6 @@ from ..peers.protocol import (
     SolverOutput,
     UnableError,
     describe,
-    remark_of,
     total,
 )
 from .isolation import (
@@ -128,7 +128,7 @@ def messages_of(job: Any) -> Iterator[Message]:
     try:
         adapter = importlib.import_module(job.module)
         solver, ready = job.set_up(adapter)
-        yield replace(ready, remark=remark_of(adapter))
+        yield replace(ready, remark=remark() if entrant else "")
         for answer in job.answers(solver):
             trouble = answer.trouble or answer.time.doubt
             if is_silent and trouble:

@@ -11,11 +11,9 @@ from plumbob.reference.arguments import FloatArray
 
 from ..problems.chains import ChainRequest
 from ..problems.evaluate import arbiter_of
-from .contestant import opened, remark
+from .contestant import opened
 from .entrant import CHAIN_TASK, Spec
 from .protocol import SolverOutput
-
-__all__ = ["joint_positions", "prepare", "remark"]
 
 # Positions without rotations must keep every link's length to this share.
 STRETCH = 1e-6

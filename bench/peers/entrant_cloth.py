@@ -6,11 +6,9 @@ from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.verify.greeting import Greeting
 
-from .contestant import opened, remark
+from .contestant import opened
 from .entrant import MOTION_TASK, STEP_TASK, Spec
 from .protocol import Mover, OwnTime, total
-
-__all__ = ["prepare", "remark"]
 
 _PARTS = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
 

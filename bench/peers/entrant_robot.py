@@ -9,7 +9,7 @@ from plumbob.reference import rotation
 from plumbob.verify.kinematics import robot_models
 
 from ..problems.robots import links
-from .contestant import opened, remark
+from .contestant import opened
 from .entrant import ROBOT_TASK, Spec
 from .protocol import (
     Ask,
@@ -20,8 +20,6 @@ from .protocol import (
     Tolerance,
     UnableError,
 )
-
-__all__ = ["prepare", "remark", "robot_inputs"]
 
 ITERATIONS = 200
 

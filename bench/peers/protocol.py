@@ -56,11 +56,6 @@ def describe(error: Exception) -> str:
     return " ".join(f"{kind}{error}".split())[:300]
 
 
-def remark_of(adapter: Any) -> str:
-    """Return an adapter's remark on its numbers, by its function `remark`, else ""."""
-    return str(adapter.remark()) if hasattr(adapter, "remark") else ""
-
-
 class SolverOutput(NamedTuple):
     """The answer of a solver."""
 
