@@ -15,7 +15,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import difference
 
 from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
+from ..harness.block import SCALES, Block, Measured, Scale
 from ..harness.record import Record
 from ..harness.values import Floats1
 from ..problems.curves import (
@@ -52,7 +52,8 @@ KINDS = {CURVE: FollowedMotion, DRIFT: DriftAngles}
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every curve for every solver in each mode, and the heart three times."""
-    robot_solvers = [ROBOT_SOLVER] if scale.is_as_short_as("quick") else list(IK_SOLVERS)
+    is_quick = scale.seconds == SCALES["quick"].seconds
+    robot_solvers = [ROBOT_SOLVER] if is_quick else list(IK_SOLVERS)
     pairs = [(curve, solver) for curve in arm_closed_curves() for solver in IK_SOLVERS]
     pairs += [(curve, solver) for curve in robot_closed_curves() for solver in robot_solvers]
     for curve, solver in pairs:

@@ -39,10 +39,6 @@ class Scale:
     entrants: tuple[Entrant, ...] = ()  # the user's solvers, beside the registered ones
     problems: "tuple[OwnProblem, ...]" = ()  # the user's problems, likewise
 
-    def is_as_short_as(self, name: str) -> bool:
-        """Return whether benchmarks are as short as at a named scale."""
-        return self.seconds == SCALES[name].seconds
-
 
 SCALES = {"quick": Scale(targets=200, seconds=0.2), "full": Scale(targets=2000, seconds=2.0)}
 
@@ -74,12 +70,10 @@ class Block:
         """Return the block of a user's solver, with its version, facts and conditions."""
         if entrant is None:
             return self
-        return replace(
-            self,
-            settings={**self.settings, "version": entrant.version},
-            facts={**self.facts, **entrant.facts},
-            conditions=entrant.conditions,
-        )
+        settings = {**self.settings, "version": entrant.version}
+        facts = {**self.facts, "entrant": True, "door": entrant.door, "digest": entrant.digest}
+        conditions = {"solver_commit": entrant.commit}
+        return replace(self, settings=settings, facts=facts, conditions=conditions)
 
     def on(self, problem: "OwnProblem") -> "Block":
         """Return the block of a user's problem, measured again when the problem changes."""

@@ -1,7 +1,6 @@
 """A solver entered by a user: its name, its address, its tasks."""
 
 from dataclasses import dataclass
-from typing import Any
 
 # What `open_contestant` takes: a Python file or object, or a command.
 Spec = str | tuple[str, ...]
@@ -34,16 +33,6 @@ class Entrant:
             method: f"{self.name}, {method}" if method and several else self.name
             for method in self.methods
         }
-
-    @property
-    def facts(self) -> dict[str, Any]:
-        """Facts of all its records."""
-        return {"entrant": True, "door": self.door, "digest": self.digest}
-
-    @property
-    def conditions(self) -> dict[str, Any]:
-        """Conditions of all its records."""
-        return {"solver_commit": self.commit}
 
     def offers(self, suite: str) -> list[str]:
         """Return its tasks in a suite."""
