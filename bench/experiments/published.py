@@ -1,7 +1,7 @@
 """The published tables again: the same set-up as far as known, with the solvers at hand."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -20,7 +20,7 @@ from ..peers.ik import toolbox, trac_ik
 from ..peers.peer import ONE_START, RESTARTS, Peer, Run
 from ..problems import published
 from ..problems.chains import TargetsForSkeleton, unit
-from ..problems.evaluate import Targets, Tolerance
+from ..problems.evaluate import Tolerance
 from ..problems.robot_targets import uniform_targets
 from ..problems.robots import is_installed
 from .robots import SUITE, RobotJob, RobotSolves
@@ -67,18 +67,19 @@ KINDS = {TRAC_IK: RobotSolves, TOOLBOX: RobotSolves, FABRIK: FabrikSolves}
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield TRAC-IK's table, the toolbox's, FABRIK's; leave out solvers not installed."""
     count = _TARGETS * scale.targets
+    counts = count, min(count, _TIMED_TARGETS)
     tolerance = Tolerance(*[math.sqrt(3.0) * published.TRAC_IK.tolerance] * 2)
     for peer in (peer for peer in _FAST if peer.is_installed):
         for robot in dict.fromkeys(rate.robot for rate in published.TRAC_IK.rates):
             if is_installed(robot):
                 targets = partial(uniform_targets, robot, count, middle=True)
-                job = _job(robot, peer, peer.first(RESTARTS), tolerance, targets, count)
+                job = RobotJob(robot, peer, peer.first(RESTARTS), tolerance, targets, *counts)
                 facts = {"task": TRAC_IK, "robot": robot, "title": robot}
                 yield job.block(f"published/trac_ik/{robot}", facts)
     tolerance = Tolerance(*[math.sqrt(2.0 * published.TOOLBOX.half_square)] * 2)
     targets = partial(uniform_targets, "ur5", count, middle=False)
     for peer, entry, infeasible in _toolbox() if is_installed("ur5") else ():
-        job = _job("ur5", peer, entry, tolerance, targets, count)
+        job = RobotJob("ur5", peer, entry, tolerance, targets, *counts)
         about: dict[str, Any] = {"task": TOOLBOX, "title": "ur5", "infeasible": infeasible}
         yield job.block("published/toolbox/ur5", about)
     for stratum, distance in published.FABRIK.distances.items():
@@ -93,17 +94,6 @@ def _toolbox() -> Iterator[tuple[Peer, Run, float | None]]:
     for search in published.TOOLBOX.searches if other.is_installed else ():
         settings = {**search.settings, "searches": 1, "limits": False, **iterations}
         yield other, Run(ONE_START, settings, search.title), search.infeasible
-
-
-def _job(
-    robot: str,
-    peer: Peer,
-    entry: Run,
-    tolerance: Tolerance,
-    targets: Callable[[], Targets],
-    count: int,
-) -> RobotJob:
-    return RobotJob(robot, peer, entry, tolerance, targets, count, min(count, _TIMED_TARGETS))
 
 
 def _fabrik(stratum: str, distance: float, scale: Scale) -> Iterator[Block]:
