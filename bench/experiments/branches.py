@@ -5,7 +5,7 @@ kinematics confirms each within the limits. Solutions that differ by whole revol
 """
 
 import importlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -182,27 +182,23 @@ def _seconds(solves: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
 # What is shown.
 
 from ..tables.captions import Captions
-from ..tables.columns import text, words_in
+from ..tables.columns import folded, of_numbers, text, words_in
 from ..tables.results import grouped, listed
 from ..tables.table import Column, Summary, listing, words
-
-
-def _column(title: str, read: Callable[[BranchValues], Any], **looks: Any) -> Column:
-    """Return a column of the numbers of records, None in a record without numbers."""
-    return Column(title, read=lambda r: read(r.values) if r.has_numbers else None, **looks)
-
 
 COLUMNS = (
     text("robot", lambda record: record.title),
     text("solver", lambda record: record.solver),
-    _column("solutions", lambda lists: lists.solutions.sum(), best="greatest"),
-    _column("missing", lambda lists: lists.missing.sum(), best="least"),
-    _column("false", lambda lists: lists.wrong.sum(), best="least"),
-    _column("time, median", lambda lists: np.median(lists.seconds), unit="µs", best="least"),
+    Column("solutions", best="greatest", read=of_numbers(lambda lists: lists.solutions.sum())),
+    Column("missing", best="least", read=of_numbers(lambda lists: lists.missing.sum())),
+    Column("false", best="least", read=of_numbers(lambda lists: lists.wrong.sum())),
+    Column("time, median", "µs", best="least", read=of_numbers(lambda r: np.median(r.seconds))),
     text("remark", lambda record: record.values.remark),
-    _column("targets", lambda lists: len(lists.solutions), folded=True),
-    _column("targets with missing ones", lambda lists: (lists.missing > 0).sum(), folded=True),
-    _column("singular targets", lambda lists: lists.singular, folded=True),
+    *folded(
+        Column("targets", read=of_numbers(lambda lists: len(lists.solutions))),
+        Column("targets with missing ones", read=of_numbers(lambda r: (r.missing > 0).sum())),
+        Column("singular targets", read=of_numbers(lambda lists: lists.singular)),
+    ),
 )
 
 

@@ -308,9 +308,7 @@ def _reached(record: Record) -> Series:
 
 
 rivals = _CAPTIONS.layout(
-    *("q2_iterations", _rivals, _rival_summary),
-    columns=RIVAL_COLUMNS,
-    figures=(iterations_chart,),
+    "q2_iterations", _rivals, _rival_summary, columns=RIVAL_COLUMNS, figures=(iterations_chart,)
 )
 
 LAYOUTS = (beyond_reach, rivals)
