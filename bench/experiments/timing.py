@@ -231,11 +231,6 @@ def is_ranked(record: Record) -> bool:
     return catalogue.find(record.solver).ranked
 
 
-def median_time(record: Record) -> float:
-    """Return the median of all rounds [s]."""
-    return metrics.timing(record.values.seconds).median
-
-
 def ranked_by_time(records: Sequence[Record]) -> metrics.Ranking | None:
     """Return the ranked solvers by the medians of shared sweeps, None without any."""
     records = list(filter(is_ranked, records))

@@ -31,8 +31,8 @@ class Section(NamedTuple):
 
     @property
     def layouts(self) -> tuple[Layout, ...]:
-        """The tables of its experiments, in order."""
-        return tuple(layout for experiment in self.experiments for layout in offered(experiment))
+        """The tables of its experiments, in order; each experiment is imported only now."""
+        return tuple(layout for each in self.experiments for layout in each.content.LAYOUTS)
 
 
 _CHAPTERS = tomllib.loads(Path(__file__).with_name("chapters.toml").read_text(encoding="utf-8"))
@@ -42,12 +42,6 @@ MOTIONS: dict[str, Callable[[Results], Scene | None]] = {
     "kinematics": arm_motion,
     "cloth": cloth_motion,
 }
-
-
-def offered(experiment: Experiment) -> tuple[Layout, ...]:
-    """Return the tables of an experiment, imported only now."""
-    layouts: tuple[Layout, ...] = experiment.content.LAYOUTS
-    return layouts
 
 
 def tables(results: Results, suites: Iterable[str] | None = None) -> list[Table]:

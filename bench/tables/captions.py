@@ -7,10 +7,9 @@ from string import Formatter
 from typing import Any
 
 from ..harness.record import Record
-from .columns import lengths_of_steps
 from .layout import Layout, records_of
 from .results import Results, settings
-from .table import NO_SUMMARY, Summary
+from .table import NO_SUMMARY, Summary, in_unit, words
 
 
 class Captions:
@@ -71,7 +70,8 @@ class Captions:
 def _setting(records: list[Record], name: str) -> str:
     """Return a setting of some records as words; `h_in_ms` is the length of their steps."""
     if name == "h_in_ms":
-        return lengths_of_steps([record for record in records if "h" in record.settings])
+        lengths = sorted({record.settings["h"] for record in records if "h" in record.settings})
+        return " or ".join(words(in_unit(h, "ms")) for h in lengths) or "–"
     return settings(records, name) or "–"
 
 

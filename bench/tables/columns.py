@@ -83,9 +83,3 @@ def words_in(value: float, unit: str) -> str:
     if math.isinf(value):
         return words(value)
     return f"{words(in_unit(value, unit))}{'' if unit == '°' else ' '}{unit}"
-
-
-def lengths_of_steps(records: Sequence[Record]) -> str:
-    """Return the step lengths of records, shortest first [ms]."""
-    lengths = sorted({record.settings["h"] for record in records})
-    return " or ".join(words(in_unit(h, "ms")) for h in lengths) or "–"
