@@ -576,7 +576,10 @@ class Point(NamedTuple):
     """A solver with a setting on a cloth, by all sweeps: the errors of the first, median times."""
 
     record: Record  # of the first sweep
-    rung: int  # the number of the setting
+    particles: int  # along each side
+    setting: str  # by its name
+    remark: str  # on this setting, else ""
+    error: float  # of a step or a motion; infinite if not reached
     seconds: float  # for a frame
     spread: float = 0.0  # largest difference between the errors of two sweeps
     drift: float = 1.0  # the longest of the sweeps' times over the shortest
@@ -598,11 +601,6 @@ class Point(NamedTuple):
         return float(self.record.values.stiffness)
 
     @property
-    def particles(self) -> int:
-        """The particles along each side."""
-        return int(self.record.values.particles[self.rung])
-
-    @property
     def cloth(self) -> str:
         """The name of its cloth in tables."""
         return self.own or f"{self.particles} × {self.particles}, {words(int(self.stiffness))} N/m"
@@ -613,25 +611,9 @@ class Point(NamedTuple):
         return catalogue.find(self.solver).engine
 
     @property
-    def error(self) -> float:
-        """The error of a step or a motion; infinite if not reached."""
-        return float(self.record.values.error[self.rung])
-
-    @property
     def is_whole(self) -> bool:
         """Whether the setting reached the end."""
         return bool(np.isfinite(self.error))
-
-    @property
-    def setting(self) -> str:
-        """The name of the setting."""
-        return str(self.record.values.rungs[self.rung])
-
-    @property
-    def remark(self) -> str:
-        """The remark on this setting, else ""."""
-        remarks = self.record.values.remarks
-        return remarks[self.rung] if self.rung < len(remarks) else ""
 
 
 def points(results: Results, task: str) -> list[Point]:
@@ -657,7 +639,9 @@ def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
         errors = np.array([values.error[k] for values, k in same])
         spread = float(np.ptp(errors)) if np.isfinite(errors).all() else 0.0
         drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
-        yield Point(first, i, float(np.median(seconds)), spread, drift, len(same))
+        remark = "".join(first.values.remarks[i : i + 1])
+        numbers = float(first.values.error[i]), float(np.median(seconds)), spread, drift, len(same)
+        yield Point(first, *rung, remark, *numbers)
 
 
 def motion_length(results: Results) -> str:
