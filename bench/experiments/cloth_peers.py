@@ -640,8 +640,8 @@ def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
         spread = float(np.ptp(errors)) if np.isfinite(errors).all() else 0.0
         drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
         remark = "".join(first.values.remarks[i : i + 1])
-        numbers = float(first.values.error[i]), float(np.median(seconds)), spread, drift, len(same)
-        yield Point(first, *rung, remark, *numbers)
+        error, median = float(first.values.error[i]), float(np.median(seconds))
+        yield Point(first, *rung, remark, error, median, spread, drift, len(same))
 
 
 def motion_length(results: Results) -> str:
