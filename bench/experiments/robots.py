@@ -367,7 +367,7 @@ from ..ranking.scores import (
     together,
 )
 from ..tables.captions import Captions
-from ..tables.columns import extremes, folded, number, text, words_in
+from ..tables.columns import folded, number, text, words_in
 from ..tables.entered import entrant_table
 from ..tables.layout import Figure, Layout
 from ..tables.results import Results, counted, first_of_kinds, grouped, leaders, listed, only_first
@@ -550,15 +550,9 @@ def _chart(
     panels = [Panel(robot, tuple(curves(field) if field else ())) for robot, field in shown.items()]
     every = [score for members in fields.values() for score in members]
     chart = _declared(name, every[0].start if every else "")
-    title = f"{chart['title']} ({_sample([score for field in shown.values() for score in field])})"
+    sample = scores.sample([score for field in shown.values() for score in field])
+    title = f"{chart['title']} ({sample})"
     return declared_chart({**chart, "title": title}, panels, results.entrants)
-
-
-def _sample(field: Sequence[Score]) -> str:
-    """Return the number of targets of scores, and of timed ones: "n = 60, 24 timed"."""
-    totals, timed = ({score.total for score in field}, {score.seconds.size for score in field})
-    sizes = [" to ".join(map(words, extremes(counts))) for counts in (totals, timed)]
-    return f"n = {sizes[0]}" + f", {sizes[1]} timed" * (totals != timed)
 
 
 def _declared(name: str, start: str) -> dict[str, Any]:

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from ..ranking.scores import PENALTY, STARTS, Score, fields_of
-from ..tables.columns import extremes, words_in
+from ..tables.columns import extent_in_words, words_in
 from ..tables.results import Results, grouped
-from ..tables.table import percent, words
+from ..tables.table import percent
 from .style import COLOURS, plain_label
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Res
     rows.sort(key=lambda row: -sum(cell.shade for cell in row.cells if cell))
     groups = [(group, len(members)) for group, members in by_group.items()]
     sizes = {s.total if quantity == SOLVED else s.seconds.size for s in scores.values()} - {0}
-    sample = f"n = {' to '.join(words(size) for size in extremes(sizes))} on each robot"
+    sample = f"n = {extent_in_words(sizes)} on each robot"
     return RobotMap(start, quantity, groups, robots, rows, sample)
 
 

@@ -18,6 +18,7 @@ from ..peers import catalogue
 from ..peers.peer import ONE_START, PORTFOLIO, RESTARTS
 from ..problems.robot_targets import seed_indices
 from ..problems.robots import LIMIT_TOLERANCE, REACHABLE, UNREACHABLE
+from ..tables.columns import extent_in_words
 from ..tables.results import Results, grouped, listed
 from ..tables.table import words
 
@@ -153,12 +154,6 @@ class Score:
         return metrics.within_budget(self.share, self.seconds[self.timed_solved], seconds)
 
     @property
-    def sample(self) -> str:
-        """The number of targets, and of the timed ones: "n = 60, 24 timed"."""
-        timed = self.seconds.size
-        return f"n = {words(self.total)}" + f", {words(timed)} timed" * (timed < self.total)
-
-    @property
     def false_successes(self) -> Share:
         """The share of attempted targets that the solver reports as solved, and that are not."""
         return metrics.share((self.attempted("claims") == 1) & ~self.attempted("solved"))
@@ -234,6 +229,13 @@ class Score:
             for name, ranking in rankings.items()
             if self.solver in ranking.first
         )
+
+
+def sample(field: Sequence[Score]) -> str:
+    """Return the number of targets of solvers, and of timed ones: "n = 60, 24 timed"."""
+    totals, timed = {score.total for score in field}, {score.seconds.size for score in field}
+    timed_ones = f", {extent_in_words(timed)} timed" * (totals != timed)
+    return f"n = {extent_in_words(totals)}{timed_ones}"
 
 
 def total(record: Record) -> int:

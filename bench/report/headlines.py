@@ -27,7 +27,7 @@ from ..peers import catalogue
 from ..peers.peer import ONE_START, PORTFOLIO, PORTFOLIO_ITERATIONS, RESTARTS
 from ..problems.robots import REACHABLE
 from ..ranking.rankings import Ranking, rankings
-from ..ranking.scores import STARTS, Score, overall, ratio_of_times
+from ..ranking.scores import STARTS, Score, overall, ratio_of_times, sample
 from ..tables.results import Results, counted, grouped, listed, solvers
 from ..tables.table import percent, words
 from .sections import SECTIONS
@@ -210,8 +210,7 @@ def _solved_in_time(rows: dict[str, Score]) -> str:
                 f"within {1e6 * seconds:,.0f} µs {full_name(first)} solves {share} of the poses "
                 f"and {full_name(rival)}, the best other solver, {other}{tie}"
             )
-    sample = next((f" ({row.sample})" for row in rows.values()), "")
-    return "; ".join(sentences) + sample * bool(sentences)
+    return "; ".join(sentences) + f" ({sample([*rows.values()][:1])})" * bool(sentences)
 
 
 def _most_solved(rows: dict[str, Score], first: str, rival: str) -> str:

@@ -31,9 +31,10 @@ def number(value: float) -> float | None:
     return None if math.isnan(value) else value
 
 
-def extremes(sizes: Collection[int]) -> list[int]:
-    """Return the least and the greatest number, once if equal; empty without any."""
-    return sorted({min(sizes), max(sizes)}) if sizes else []
+def extent_in_words(sizes: Collection[int]) -> str:
+    """Return the least and the greatest number: "20 to 200", "20" if equal, "" without any."""
+    ends = sorted({min(sizes), max(sizes)}) if sizes else []
+    return " to ".join(map(words, ends))
 
 
 def of_numbers(read: Callable[[Any], Cell]) -> Callable[[Record], Cell]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..harness.record import Record
 from ..peers import catalogue
-from .columns import extremes
+from .columns import extent_in_words
 from .results import Results, settings
 from .table import (
     NO_SUMMARY,
@@ -20,7 +20,6 @@ from .table import (
     cells,
     ranked_rows,
     with_rows,
-    words,
 )
 
 # Returns the sketch of a figure, None if its records are missing.
@@ -169,10 +168,8 @@ def _samples(records: Sequence[Record]) -> str:
         seconds = numbers.get("seconds", np.empty(0))
         if seconds.ndim > 1:  # (round, target), or (sweep, round) without targets
             counts["round"].add(len(seconds) if arrays else seconds.size)
-    extents = {noun: extremes(sizes - {0, 1}) for noun, sizes in counts.items()}
-    return ", ".join(
-        f"{' to '.join(map(words, sizes))} {noun}s" for noun, sizes in extents.items() if sizes
-    )
+    extents = {noun: extent_in_words(sizes - {0, 1}) for noun, sizes in counts.items()}
+    return ", ".join(f"{sizes} {noun}s" for noun, sizes in extents.items() if sizes)
 
 
 def _machine(machine: Mapping[str, Any]) -> str:
