@@ -124,7 +124,7 @@ def iterations(problem: TargetsForSkeleton, solver: str) -> Measured:
 
 from ..ranking.scores import Score
 from ..tables.captions import Captions
-from ..tables.columns import text
+from ..tables.columns import reported_iterations, text
 from ..tables.results import Results, counted, grouped, label
 from ..tables.table import Column, Summary, listing, words
 from .robots import RULE
@@ -223,11 +223,10 @@ def _of_toolbox(record: Record) -> Iterator[PublishedNumber]:
 
 def _of_fabrik(record: Record) -> Iterator[PublishedNumber]:
     """Yield the mean and the largest number of iterations of a solver in a stratum."""
-    stratum, counts = record.values.stratum, record.values.iterations
+    stratum, counts = record.values.stratum, reported_iterations(record)
     number = published.FABRIK.means.get(record.solver, {}).get(stratum)
     source = "" if number is None else published.FABRIK.source
     row = PublishedNumber("FABRIK", stratum, label(record.solver), source, record)
-    counts = counts[~np.isnan(counts)]
     if not counts.size:
         row = row._replace(mark="iterations not reported")
         yield from (row.of("iterations, mean", number), row.of("iterations, largest", None))

@@ -37,10 +37,6 @@ def in_unit(value: float, unit: str) -> float:
     return UNITS.get(unit.partition("/")[0], 1.0) * value
 
 
-def _identity(subject: Any) -> Any:
-    return subject
-
-
 @dataclass(frozen=True)
 class Column:
     """A column: its heading, and how a cell is read from the subject of a row."""
@@ -51,7 +47,7 @@ class Column:
     # format of a cell, for example `INTERVAL`; left out where its parts have own columns
     note: str = ""
     # returns the cell of a subject, in SI units or as a share of 1
-    read: Callable[[Any], Any] = field(default=_identity, compare=False)
+    read: Callable[[Any], Any] = field(default=lambda subject: subject, compare=False)
     factor: float | None = None  # of the cell, if not that of the unit
     best: str = ""  # "least" or "greatest", "" if no cell is best
     group: str = ""  # common heading of neighbouring columns

@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from ...figures.sketch import Drawing
 from ...harness.metrics import Share
+from ...tables.columns import extent_in_words
 from ...tables.results import label
 from ...tables.table import Cell, Source, Table, best_cells, decimals, number_of, words
 from ...tables.writers import POWER, csv_names
@@ -92,9 +93,8 @@ def _head(table: Table, j: int, folded: bool, names_solver: bool) -> PageHead:
     marks = ("words" * column.words, "folded" * folded, "who" * names_solver)
     lead = column.title.removesuffix(column.below) if column.group else ""
     has_filter = (j < table.compared or j == 0 or names_solver) and column.title != STARTS
-    totals = sorted(cell.total for row in table.rows if isinstance(cell := row[j], Share))
-    sizes = dict.fromkeys(words(total) for total in (*totals[:1], *totals[-1:]))
-    unit = f"n = {' to '.join(sizes)}" if sizes else column.unit and f"[{column.unit}]"
+    sizes = extent_in_words({cell.total for row in table.rows if isinstance(cell := row[j], Share)})
+    unit = f"n = {sizes}" if sizes else column.unit and f"[{column.unit}]"
     title = column.titled.removeprefix(lead)
     classes = " ".join(filter(None, marks))
     names = ",".join(csv_names(column, is_share=bool(sizes)))
