@@ -209,10 +209,10 @@ def _summary(records: Sequence[Record]) -> Summary:
         f"{words(_total(members, 'wrong'))} false; {listed([*map(_time, members)])}"
         for solver, members in measured.items()
     )
-    ours = measured.get(PLUMBOB, [])
-    solutions, missing = (_total(ours, name) for name in ("solutions", "missing"))
+    own_records = measured.get(PLUMBOB, [])
+    solutions, missing = (_total(own_records, name) for name in ("solutions", "missing"))
     sentence = f"Plumbob lists {words(solutions)} of {words(solutions + missing)} solutions."
-    return listing(sentence * bool(ours), points)
+    return listing(sentence * bool(own_records), points)
 
 
 def _total(records: Sequence[Record], name: str) -> int:

@@ -240,7 +240,7 @@ def _cloth(row: SolverRecords) -> str:
 
 
 _solved = _iterations_to(SOLVED).read
-_tried = _of(ONE_STEP, lambda step: step.error.size - 1)
+_trials = _of(ONE_STEP, lambda step: step.error.size - 1)
 
 CONVERGENCE = (
     text("cloth", _cloth),
@@ -250,7 +250,7 @@ CONVERGENCE = (
     Column("smallest error", best="least", read=_of(ONE_STEP, lambda step: step.error.min())),
     _after("error", 1000, best="least", folded=True),
     *(_iterations_to(d, folded=True) for d in DECADES if d not in ("1e-2", "1e-4")),
-    Column("iterations tried", read=_tried, folded=True),
+    Column("iterations tried", read=_trials, folded=True),
     *(_after("residual", count, folded=True) for count in (1, 10, 100, 1000)),
     *(column for count in FEW_ITERATIONS for column in _truncated(count)),
 )
@@ -265,7 +265,7 @@ def _convergence_rows(results: Results) -> list[SolverRecords]:
 
 def _convergence_summary(rows: Sequence[SolverRecords]) -> Summary:
     points = [
-        f"{cloth}: {listed([_count(row) for row in of_cloth if _tried(row)])}"
+        f"{cloth}: {listed([_count(row) for row in of_cloth if _trials(row)])}"
         for cloth, of_cloth in grouped(rows, _cloth).items()
     ]
     few = (record for row in rows for record in row if record.task == FEW)
@@ -279,7 +279,7 @@ def _convergence_summary(rows: Sequence[SolverRecords]) -> Summary:
 
 def _count(row: SolverRecords) -> str:
     count = _solved(row)
-    iterations = f"more than {words(_tried(row))}" if count is None else words(count)
+    iterations = f"more than {words(_trials(row))}" if count is None else words(count)
     return f"{label(row[0].solver)} {iterations}"
 
 

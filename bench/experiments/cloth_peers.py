@@ -618,7 +618,7 @@ class Point(NamedTuple):
 
 def points(results: Results, task: str) -> list[Point]:
     """Return all points of a task, cloth by cloth: stiffness first, then particles."""
-    return results.once(_points, task)
+    return results.cached(_points, task)
 
 
 def _points(results: Results, task: str) -> list[Point]:

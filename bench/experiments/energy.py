@@ -59,11 +59,11 @@ def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
     system, start, rest = long_swing(name)
     # The faster of two integrators in agreement step by step. Local/global converges in a dozen
     # iterations at this stiffness, each a hundredth of the cost of a Newton iteration.
-    ours: dict[str, Any] = {
+    integrators: dict[str, Any] = {
         "symplectic Euler": SIMULATORS["symplectic Euler"],
         "implicit Euler": partial(implicit, "local_global", tolerance=TOLERANCE),
     }
-    simulation = ours.get(integrator) or SIMULATORS[f"MuJoCo {integrator}"]
+    simulation = integrators.get(integrator) or SIMULATORS[f"MuJoCo {integrator}"]
     times, energies = energy_series(simulation, system, start, H, steps=steps, every=EVERY)
     above = energies - rest
     return {"time": times, "left": above / above[0]}

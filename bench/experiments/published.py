@@ -152,8 +152,8 @@ class PublishedNumber(NamedTuple):
 
     def measured(self, place: int = 0) -> float | None:
         """Return the number as measured, or a bound; None if unknown."""
-        known = place < len(self.values) and not np.isnan(self.values[place])
-        return self.values[place] if known else None
+        has_value = place < len(self.values) and not np.isnan(self.values[place])
+        return self.values[place] if has_value else None
 
 
 def _scored(row: PublishedNumber, score: Score) -> PublishedNumber:

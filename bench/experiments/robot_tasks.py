@@ -104,7 +104,7 @@ class SolverTask(NamedTuple):
     solver: str
     records: list[Record]
 
-    def joined(self, read: Callable[[TaskValues], np.ndarray]) -> np.ndarray | None:
+    def concatenation(self, read: Callable[[TaskValues], np.ndarray]) -> np.ndarray | None:
         """Return an array of the records with numbers, one after the other; None without any."""
         arrays = [read(record.values) for record in self.records if record.has_numbers]
         return np.concatenate(arrays) if arrays else None
@@ -112,13 +112,13 @@ class SolverTask(NamedTuple):
     @property
     def solved(self) -> metrics.Share | None:
         """The share of targets whose task is met."""
-        solved = self.joined(lambda values: values.solved)
+        solved = self.concatenation(lambda values: values.solved)
         return None if solved is None else metrics.share(solved)
 
 
 def _median(title: str, unit: str, read: Callable[[TaskValues], Floats1], **looks: Any) -> Column:
     def cell(row: SolverTask) -> float | None:
-        numbers = row.joined(read)
+        numbers = row.concatenation(read)
         return None if numbers is None or not len(numbers) else float(np.median(numbers))
 
     return Column(f"{title}, median", unit, read=cell, **looks)

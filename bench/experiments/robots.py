@@ -411,15 +411,15 @@ class Participant(NamedTuple):
     def robots_taken(self) -> str:
         """The robots that it takes."""
         titles = {record.title for record in self.records if "solved" in record.measured}
-        taken = [robot for robot in self.robots if robot in titles]
-        return title_of(taken, [robot for robot in self.robots if robot not in titles])
+        names = [robot for robot in self.robots if robot in titles]
+        return title_of(names, [robot for robot in self.robots if robot not in titles])
 
     @property
     def overhead(self) -> float:
         """The median time that the harness adds to an attempt [s]; NaN if unknown."""
         every = [getattr(record.values, "overhead", None) for record in self.records]
-        known = [overhead for overhead in every if overhead is not None and overhead >= 0.0]
-        return float(np.median(known)) if known else np.nan
+        overheads = [overhead for overhead in every if overhead is not None and overhead >= 0.0]
+        return float(np.median(overheads)) if overheads else np.nan
 
     @property
     def remark(self) -> str:
@@ -543,14 +543,16 @@ def _chart(
     results: Results,
 ) -> Sketch | None:
     """Return a panel of curves for each robot; None if there are no solvers with this start."""
-    shown = {
+    fields_shown = {
         robot: [score for score in members if score.is_timed and score.is_finished]
         for robot, members in fields.items()
     }
-    panels = [Panel(robot, tuple(curves(field) if field else ())) for robot, field in shown.items()]
+    panels = [
+        Panel(robot, tuple(curves(field) if field else ())) for robot, field in fields_shown.items()
+    ]
     every = [score for members in fields.values() for score in members]
     chart = _declared(name, every[0].start if every else "")
-    sample = scores.sample([score for field in shown.values() for score in field])
+    sample = scores.sample([score for field in fields_shown.values() for score in field])
     title = f"{chart['title']} ({sample})"
     return declared_chart({**chart, "title": title}, panels, results.entrants)
 
@@ -634,7 +636,7 @@ def _reached(name: str) -> Callable[[Score], Floats]:
     return lambda score: score.attempted(name)[score.attempted("solved")]
 
 
-_WHO = (
+_SOLVER = (
     text("robots", lambda score: score.robots),
     text("starts", lambda score: score.start),
     text("solver", lambda score: score.solver),
@@ -730,7 +732,7 @@ over_all = _layout(
     "robots_overall",
     scores.overall,
     (
-        *(*_WHO, _SOLVED, _FALSE, _MEAN),
+        *(*_SOLVER, _SOLVED, _FALSE, _MEAN),
         text("mark", _mark),
         *folded(*_MEAN_BOUNDS, *_BY_SEED),
         *folded(*map(_outcome, OUTCOMES[1:]), _DISPUTED, _GROUP),
@@ -741,7 +743,7 @@ robot_by_robot = _layout(
     "robots_by_robot",
     scores.scores,
     (
-        *(*_WHO, _SOLVED, _FALSE, _MEDIAN),
+        *(*_SOLVER, _SOLVED, _FALSE, _MEDIAN),
         Column(RELATIVE, best="least", read=lambda score: number(score.relative_time)),
         Column(BESIDE_OURS, best="least", read=lambda score: number(score.ratio_to_ours)),
         *(text("mark", _mark), _GROUP),
@@ -767,7 +769,7 @@ def _outcome_columns(rows: Sequence[Score]) -> list[Column]:
     """Return the columns of outcomes, folded if all zero, and of strata."""
     strata = rows[0].records[0].values.strata if rows else ()
     return [
-        *_WHO,
+        *_SOLVER,
         *(_outcome(name, not any(score.outcomes[name] for score in rows)) for name in OUTCOMES),
         *(_TOTAL, _DISPUTED),
         *(Column(f"solved, {name}", note=INTERVAL, best="greatest", folded=True,
@@ -839,7 +841,7 @@ unreachable = _layout(
     "robots_unreachable",
     scores.out_of_reach,
     (
-        *(*_WHO, _FALSE, replace(_ABOVE_BEST, best="least"), _MEDIAN),
+        *(*_SOLVER, _FALSE, replace(_ABOVE_BEST, best="least"), _MEDIAN),
         text("mark", lambda score: "; ".join(filter(None, (score.limits, score.trouble)))),
         *folded(_LARGEST_ABOVE_BEST, _TO_BOUND),
         *folded(*_of_spread("distance to target", "m", lambda s: s.attempted("position"))),

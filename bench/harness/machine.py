@@ -28,7 +28,7 @@ PRESENTATION = (
     *("bench/ranking", "bench/tables", "verify/screen"),
 )
 # The line of an experiment's file above which it measures, and below which it only shows numbers.
-SHOWN = b"# What is shown."
+DIVIDER = b"# What is shown."
 
 
 @functools.cache
@@ -100,10 +100,10 @@ def source_digest() -> str:
 
 
 def measuring_part(path: Path) -> bytes:
-    """Return the text of a file; of an experiment's file, the text above the line `SHOWN`."""
+    """Return the text of a file; of an experiment's file, the text above the line `DIVIDER`."""
     text = path.read_bytes()
     is_experiment = path.parent == ROOT / "bench" / "experiments"
-    return text.partition(b"\n" + SHOWN)[0] if is_experiment else text
+    return text.partition(b"\n" + DIVIDER)[0] if is_experiment else text
 
 
 def source_files() -> list[Path]:

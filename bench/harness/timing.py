@@ -57,13 +57,13 @@ MAXIMUM_SILENCES = 3
 def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
     """Return the answer of a solve with its time; an exception is a failed attempt."""
 
-    def tried() -> SolverOutput:
+    def solution() -> SolverOutput:
         try:
             return solve()
         except Exception as error:  # an exception of an engine is its result
             return SolverOutput(None, False, error=describe(error))
 
-    output, seconds = clock.time_call(tried)
+    output, seconds = clock.time_call(solution)
     return output._replace(time=output.time or OwnTime(seconds))
 
 
@@ -190,12 +190,12 @@ class Job(NamedTuple):
 
     def answers(self, ask: Ask) -> Iterator[Solved]:
         """Solve the targets in order, until the budget is spent."""
-        spent = 0.0
+        duration = 0.0
         for i in range(self.targets.shape[0]):
             answer = self.solve(ask, i)()
             yield answer
-            spent += answer.duration
-            if spent > self.budget:
+            duration += answer.duration
+            if duration > self.budget:
                 break
 
     def solve(self, ask: Ask, i: int) -> Callable[[], Solved]:

@@ -30,7 +30,7 @@ class Place(NamedTuple):
         return catalogue.find(self.solver).engine or self.solver
 
 
-class Ranking(NamedTuple):
+class TableRanking(NamedTuple):
     """The solvers of a group of compared rows, by a column of a table."""
 
     table: Table
@@ -85,7 +85,7 @@ def measures_time(column: Column) -> bool:
     return column.unit.partition("/")[0] in _UNITS_OF_TIME or column.title.startswith("time")
 
 
-def rankings(table: Table) -> Iterator[Ranking]:
+def rankings(table: Table) -> Iterator[TableRanking]:
     """Yield the rankings of a finished table, visible column by column; none without sources."""
     ranked = [i for i, source in enumerate(table.sources)
               if source.solvers and i not in table.unranked]  # fmt: skip
@@ -97,7 +97,9 @@ def rankings(table: Table) -> Iterator[Ranking]:
             results = [place for place in places if not math.isnan(place.number)]
             first = [place for place in results if (place.row, j) in best] or results
             case, kind = _words_of(table, rows[0])
-            yield Ranking(table, column, case, kind, places, frozenset(p.solver for p in first))
+            yield TableRanking(
+                table, column, case, kind, places, frozenset(p.solver for p in first)
+            )
 
 
 def _places(table: Table, j: int, rows: Sequence[int]) -> tuple[Place, ...]:

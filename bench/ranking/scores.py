@@ -233,8 +233,8 @@ class Score:
 
 def sample(field: Sequence[Score]) -> str:
     """Return the number of targets of solvers, and of timed ones: "n = 60, 24 timed"."""
-    totals, timed = {score.total for score in field}, {score.seconds.size for score in field}
-    timed_ones = f", {extent_in_words(timed)} timed" * (totals != timed)
+    totals, sizes = {score.total for score in field}, {score.seconds.size for score in field}
+    timed_ones = f", {extent_in_words(sizes)} timed" * (totals != sizes)
     return f"n = {extent_in_words(totals)}{timed_ones}"
 
 
@@ -292,7 +292,7 @@ def scores(results: Results, task: str = REACHABLE) -> list[Score]:
 
 def fields_of(results: Results, start: str, task: str = REACHABLE) -> dict[str, list[Score]]:
     """Return every solver with a start, robot by robot."""
-    return results.once(_fields, start, task)
+    return results.cached(_fields, start, task)
 
 
 def _fields(results: Results, start: str, task: str) -> dict[str, list[Score]]:
@@ -374,7 +374,7 @@ def overall(results: Results) -> list[Score]:
 
     Solvers are compared only over their common robots of a group.
     """
-    return results.once(_overall)
+    return results.cached(_overall)
 
 
 def _overall(results: Results) -> list[Score]:

@@ -26,7 +26,7 @@ from ..harness.record import FINISHED
 from ..peers import catalogue
 from ..peers.peer import ONE_START, PORTFOLIO, PORTFOLIO_ITERATIONS, RESTARTS
 from ..problems.robots import REACHABLE
-from ..ranking.rankings import Ranking, rankings
+from ..ranking.rankings import TableRanking, rankings
 from ..ranking.scores import STARTS, Score, overall, ratio_of_times, sample
 from ..tables.results import Results, counted, grouped, listed, solvers
 from ..tables.table import percent, words
@@ -321,21 +321,21 @@ def _precision(race: Race, engines: Collection[str]) -> str:
     return f"; each runs on one core, {single} in single precision" if is_told else ""
 
 
-def _race_result(race: Race, cases: Sequence[Ranking]) -> str:
+def _race_result(race: Race, cases: Sequence[TableRanking]) -> str:
     """Return the engine that is the fastest in most cases, and the best other engine."""
     total = counted(len(cases), race.noun)
     winners = Counter(case.leader.engine for case in cases if case.leader)
     if not winners:
         return f"no engine is the fastest beyond chance ({total})"
     first = winners.most_common(1)[0][0]
-    won = [case for case in cases if case.leader and case.leader.engine == first]
-    rivals = [next((p for p in case.results if p.engine != first), None) for case in won]
-    opposed = [(c, rival) for c, rival in zip(won, rivals, strict=True) if rival]
-    sentence = f"{full_name(first)} is the fastest on {len(won)} of {total}"
+    victories = [case for case in cases if case.leader and case.leader.engine == first]
+    rivals = [next((p for p in case.results if p.engine != first), None) for case in victories]
+    opposed = [(c, rival) for c, rival in zip(victories, rivals, strict=True) if rival]
+    sentence = f"{full_name(first)} is the fastest on {len(victories)} of {total}"
     if opposed:
         factors = span([case.factor(rival) for case, rival in opposed])
         best = listed(list(dict.fromkeys(full_name(rival.engine) for _, rival in opposed)), "or")
         sentence += f", {factors} times faster than the best other engine, {best}"
-    if alone := len(won) - len(opposed):
+    if alone := len(victories) - len(opposed):
         sentence += f"; no other engine solves {alone} of them"
     return sentence

@@ -1,5 +1,6 @@
 """Print the result of a report or a bench in a few lines: ranks, leaders, missing solvers."""
 
+import shlex
 from collections.abc import Iterable, Sequence
 
 from plumbob.text.printable import visible
@@ -27,7 +28,8 @@ def outcome(report: BenchReport, width: int) -> list[str]:
     answers = report.answers
     sentences = [_verdict(answers.verdict), *leading(answers)]
     sentences += _scale_and_absent(answers, width)
-    page = f"Read on: {report.page}, the page; `plumbob report --list` names the tables."
+    command = shlex.join(["plumbob", "report", str(report.page.parent), "--list"])
+    page = f"Read on: {report.page}, the page; `{command}` names the tables."
     lines, last = _lines(sentences, width), _lines([page], width)
     missing = [text for text in report.missing if not text.startswith("Absent peers")]
     lines += _missing(missing, width, LINES - len(lines) - len(last))

@@ -32,7 +32,7 @@ class Section(NamedTuple):
     @property
     def layouts(self) -> tuple[Layout, ...]:
         """The tables of its experiments, in order; each experiment is imported only now."""
-        return tuple(layout for each in self.experiments for layout in each.content.LAYOUTS)
+        return tuple(layout for e in self.experiments for layout in e.content.LAYOUTS)
 
 
 _CHAPTERS = tomllib.loads(Path(__file__).with_name("chapters.toml").read_text(encoding="utf-8"))

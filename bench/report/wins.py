@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from ..ranking.rankings import Ranking, measures_time, rankings
+from ..ranking.rankings import TableRanking, measures_time, rankings
 from ..tables.results import Results, counted, grouped, listed
 from ..tables.table import Table
 from .sections import SECTIONS
@@ -25,36 +25,38 @@ def wins_in(table: Table, chapter: str = "") -> Iterator[Headline]:
     """Yield where others win in a table: a sentence for each winner, column and kind of case."""
     compared = [ranking for ranking in rankings(table) if ranking.own and _has_rival(ranking)]
     for group in grouped(compared, lambda ranking: (ranking.column, ranking.kind)).values():
-        lost = [ranking for ranking in group if ranking.is_lost]
-        for wins in grouped(lost, lambda r: (r.places[0].solver, r.own and r.own.solver)).values():
+        losses = [ranking for ranking in group if ranking.is_lost]
+        for wins in grouped(
+            losses, lambda r: (r.places[0].solver, r.own and r.own.solver)
+        ).values():
             yield Headline(chapter, "Where others win", _sentence(wins, len(group)), table.name)
 
 
-def _has_rival(ranking: Ranking) -> bool:
+def _has_rival(ranking: TableRanking) -> bool:
     own = ranking.own
     return any(own and place.engine != own.engine for place in ranking.places)
 
 
-def _sentence(wins: Sequence[Ranking], total: int) -> str:
+def _sentence(wins: Sequence[TableRanking], total: int) -> str:
     """Return who wins over the best of ours in these cases, out of so many, and by how much."""
-    win, won = wins[0], [ranking.case for ranking in wins if ranking.case]
+    win, cases_won = wins[0], [ranking.case for ranking in wins if ranking.case]
     assert win.own
     kind = f", {', '.join(win.kind)}," * bool(win.kind)
     noun = title if (title := win.table.columns[0].title) in _NOUNS else "case"
-    cases = f" ({listed(won)})" if 0 < len(won) <= MAX_NAMED else ""
+    cases = f" ({listed(cases_won)})" if 0 < len(cases_won) <= MAX_NAMED else ""
     names = f"{full_name(win.places[0].solver)} {_verb(win)} {full_name(win.own.solver)}"
     place = f"(“{win.column.title}” in “{win.table.title}”)"
     count = f"on {len(wins)} of {counted(total, noun)}"
     return f"{names}{kind} {count}{cases}{_size(wins)} {place}."
 
 
-def _verb(win: Ranking) -> str:
+def _verb(win: TableRanking) -> str:
     if measures_time(win.column):
         return "is faster than"
     return "solves more than" if win.is_of_shares else "is better than"
 
 
-def _size(wins: Sequence[Ranking]) -> str:
+def _size(wins: Sequence[TableRanking]) -> str:
     """Return by how much others win: ", by a factor of 1.6 to 1.8"."""
     factors = [ranking.factor(ranking.own) for ranking in wins if ranking.own]
     finite = [factor for factor in factors if not math.isnan(factor)]

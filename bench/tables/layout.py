@@ -63,7 +63,7 @@ class Layout:
 
         Our own loops on other engines are shown, and never best.
         """
-        return results.once(self._table)
+        return results.cached(self._table)
 
     def _table(self, results: Results) -> Table:
         subjects = list(self.subjects(results))

@@ -21,7 +21,7 @@ NAMED_TIES = 3
 
 Subject = TypeVar("Subject")
 Key = TypeVar("Key", bound=Hashable)
-Made = TypeVar("Made")
+Product = TypeVar("Product")
 
 
 class Results:
@@ -38,14 +38,14 @@ class Results:
         self.every = [printable(record) for record in records if not record.superseded]
         self.records = [record for record in self.every if not record.failed]
         self.failed = [record for record in self.every if record.failed]
-        self._made: dict[tuple[Any, ...], Any] = {}
+        self._products: dict[tuple[Any, ...], Any] = {}
 
-    def once(self, make: Callable[..., Made], *arguments: Hashable) -> Made:
+    def cached(self, make: Callable[..., Product], *arguments: Hashable) -> Product:
         """Return what a function makes of the results and arguments, made at the first request."""
-        if (key := (make, *arguments)) not in self._made:
-            self._made[key] = make(self, *arguments)
-        made: Made = self._made[key]
-        return made
+        if (key := (make, *arguments)) not in self._products:
+            self._products[key] = make(self, *arguments)
+        product: Product = self._products[key]
+        return product
 
     @property
     def entrants(self) -> frozenset[str]:

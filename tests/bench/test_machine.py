@@ -77,7 +77,7 @@ def test_of_an_experiment_only_the_text_above_its_tables_is_digested(copy):
 EXPERIMENT_FILES = [
     path
     for path in sorted((ROOT / "bench" / "experiments").glob("*.py"))
-    if machine.SHOWN in path.read_bytes()
+    if machine.DIVIDER in path.read_bytes()
 ]
 
 
