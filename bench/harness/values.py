@@ -50,7 +50,9 @@ def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
         ValueError: if a field is missing, or of another type or number of axes.
     """
     scalars = {
-        name: field.item() if isinstance(field, np.ndarray) and not field.ndim else field
+        name: field.item()
+        if isinstance(field, np.ndarray | np.generic) and not field.ndim
+        else field
         for name, field in fields.items()
     }
     try:

@@ -332,6 +332,12 @@ def test_a_setting_is_not_read_as_an_array_of_the_same_name():
     assert record.values.seconds is None
 
 
+def test_scalars_of_numpy_are_numbers():
+    fields = {"subject": "kinematics", "group": "g", "work": "w", "seconds": np.ones((1, 1))}
+    block = Block("timing", "p", "copy", lambda: {**fields, "moved": np.float64(3.0)})
+    assert measure(block).values.moved == 3.0
+
+
 def test_a_misspelt_number_or_word_is_a_failure():
     misspelt = replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT, "lift": 1.0})
     why = "ValueError: measured: expected values that Swing declares, got lift"
