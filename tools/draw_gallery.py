@@ -15,8 +15,8 @@ from matplotlib.figure import Figure
 
 from plumbob.bench.motion.motion import Scene
 from plumbob.bench.show import picture, scenes
+from plumbob.bench.show.scene_solver import YourSolver
 from plumbob.bench.show.scenes import CLOTH, EXACT
-from plumbob.bench.show.your_solver import YourSolver
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.mass_spring.model import Integrator, StepModel

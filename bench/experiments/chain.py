@@ -25,7 +25,7 @@ from ..harness.measure import not_asked
 from ..harness.record import Record
 from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
-from ..peers.entrant import CHAIN_TASK
+from ..peers.user_solver import CHAIN_TASK
 from ..problems.chains import BEYOND, SEED, STRATA, TargetsForSkeleton, chain_targets
 from ..problems.curves import CURVE
 

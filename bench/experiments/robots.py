@@ -22,8 +22,8 @@ from ..harness.progress import announce
 from ..harness.timing import Job, Times, answers, first_targets, times_in_turns
 from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
-from ..peers.entrant import ROBOT_TASK
 from ..peers.peer import Peer, Run
+from ..peers.user_solver import ROBOT_TASK
 from ..problems.evaluate import AGREEMENT, Targets, Tolerance, arbiter_of, evaluator_of
 from ..problems.robot_targets import (
     SEED,
@@ -368,10 +368,10 @@ from ..ranking.scores import (
 )
 from ..tables.captions import Captions
 from ..tables.columns import folded, number, text, words_in
-from ..tables.entered import entrant_table
 from ..tables.layout import Figure, Layout
 from ..tables.results import Results, counted, first_of_kinds, grouped, leaders, listed, only_first
 from ..tables.table import INTERVAL, Column, Summary, listing, words
+from ..tables.user_solvers import entrant_table
 
 CAPTIONS = Captions(
     __file__,

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..peers.entrant import Entrant
+from ..peers.user_solver import Entrant
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .. import clock
-from ..peers.contestant import remark
+from ..peers.connection import remark
 from ..peers.protocol import (
     Ask,
     BenchRobot,

@@ -15,8 +15,8 @@ from typing import Any
 from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from . import cloth, ik
-from .entrant import CHAIN_TASK, ROBOT_TASK, Entrant
 from .peer import EXPLICIT, ITERATED, LINEARISED, ONE_START, RESTARTS, UNDECLARED, Peer, Run
+from .user_solver import CHAIN_TASK, ROBOT_TASK, Entrant
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton engine"
 
@@ -168,7 +168,7 @@ def _cloth_user(entrant: Entrant) -> Peer:
 
 
 def _user(entrant: Entrant, problem: str, runs: tuple[Run, ...], title: str = "") -> Peer:
-    title, module = title or entrant.name, f"{__package__}.entrant_{problem}"
+    title, module = title or entrant.name, f"{__package__}.user_{problem}"
     return Peer(title, module, "", "", "", "", runs, engine=entrant.name, entrant=entrant)
 
 

@@ -12,8 +12,8 @@ from plumbob.verify.greeting import Greeting
 
 from ..problems.own import clean
 from . import catalogue
-from .entrant import SUITE_TASKS, Entrant, Spec
 from .sources import commit_of, digest_of
+from .user_solver import SUITE_TASKS, Entrant, Spec
 
 GROUP = "plumbob.solvers"
 

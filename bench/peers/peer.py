@@ -5,8 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
-from .entrant import Entrant
 from .packages import distribution_of
+from .user_solver import Entrant
 
 # A single attempt, a portfolio of several, and restarts from random poses until the solver succeeds
 # answer different questions.

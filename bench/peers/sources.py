@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from .entrant import Spec
+from .user_solver import Spec
 
 # Files of a program larger than this [B] are interpreters rather than somebody's solver.
 _LARGEST = 1 << 26

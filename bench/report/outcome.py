@@ -7,9 +7,9 @@ from plumbob.text.printable import visible
 
 from ..peers.packages import peers_command
 from ..tables.aligned import filled
-from ..tables.entered import remarks_of_entrants
 from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
+from ..tables.user_solvers import remarks_of_entrants
 from .headlines import ClaimCount, Overview, overview
 from .report import BenchReport
 from .sections import tables

@@ -15,7 +15,7 @@ from ..motion import motion
 from ..motion.motion import Moving, Scene
 from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..tables.results import label
-from .your_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
+from .scene_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *reference.curves)

@@ -10,7 +10,7 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import catalogue, opening
-from plumbob.bench.peers.entrant import Entrant
+from plumbob.bench.peers.user_solver import Entrant
 from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
 from plumbob.bench.problems.robots import REACHABLE, UNREACHABLE

@@ -12,7 +12,7 @@ from .terminal import progress
 from .verify import program_of
 
 if TYPE_CHECKING:
-    from plumbob.bench.show.your_solver import YourSolver
+    from plumbob.bench.show.scene_solver import YourSolver
 
 
 Scene = Annotated[Text, argument("SCENE", "arm, cloth, or a curve that the arm draws.")]
@@ -38,8 +38,8 @@ def show(
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
     written as BVH, which animation programs open.
     """
+    from plumbob.bench.show.scene_solver import YourSolver
     from plumbob.bench.show.scenes import SCENES
-    from plumbob.bench.show.your_solver import YourSolver
 
     program = program_of(context)
     if own_solver is not None and program:

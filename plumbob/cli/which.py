@@ -60,7 +60,7 @@ def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
     """
     from plumbob.bench.harness.block import SCALES, Choice
     from plumbob.bench.peers import opening
-    from plumbob.bench.peers.entrant import ROBOT_TASK
+    from plumbob.bench.peers.user_solver import ROBOT_TASK
     from plumbob.bench.problems.files import read
 
     if not robot.exists():

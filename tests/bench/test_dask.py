@@ -21,8 +21,8 @@ from plumbob.bench.harness.executors import dask, executor_at
 from plumbob.bench.harness.machine import measuring_part, stamp
 from plumbob.bench.harness.measure import block_key
 from plumbob.bench.harness.record import Record, RecordFile, decode
-from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.sources import digest_of
+from plumbob.bench.peers.user_solver import Entrant
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown

@@ -18,9 +18,9 @@ from plumbob.bench.peers import opening
 from plumbob.bench.peers.peer import Peer
 from plumbob.bench.report.headlines import absent
 from plumbob.bench.report.sections import tables
-from plumbob.bench.tables.entered import remarks_of_entrants
 from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
+from plumbob.bench.tables.user_solvers import remarks_of_entrants
 from plumbob.cli import selection
 from plumbob.cli.main import run_command
 

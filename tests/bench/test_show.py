@@ -11,7 +11,7 @@ import pytest
 
 from plumbob.bench.motion import motion
 from plumbob.bench.show import scenes as shows
-from plumbob.bench.show.your_solver import YourSolver
+from plumbob.bench.show.scene_solver import YourSolver
 from plumbob.cli import main as cli
 from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 

@@ -11,9 +11,9 @@ from plumbob.reference.arguments import FloatArray
 
 from ..problems.chains import ChainRequest
 from ..problems.evaluate import arbiter_of
-from .contestant import opened
-from .entrant import CHAIN_TASK, Spec
+from .connection import opened
 from .protocol import SolverOutput
+from .user_solver import CHAIN_TASK, Spec
 
 # Positions without rotations must keep every link's length to this share.
 STRETCH = 1e-6

@@ -9,8 +9,7 @@ from plumbob.reference import rotation
 from plumbob.verify.kinematics import robot_models
 
 from ..problems.robots import links
-from .contestant import opened
-from .entrant import ROBOT_TASK, Spec
+from .connection import opened
 from .protocol import (
     Ask,
     BenchRobot,
@@ -20,6 +19,7 @@ from .protocol import (
     Tolerance,
     UnableError,
 )
+from .user_solver import ROBOT_TASK, Spec
 
 ITERATIONS = 200
 

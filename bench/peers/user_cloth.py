@@ -6,9 +6,9 @@ from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.verify.greeting import Greeting
 
-from .contestant import opened
-from .entrant import MOTION_TASK, STEP_TASK, Spec
+from .connection import opened
 from .protocol import Mover, OwnTime, total
+from .user_solver import MOTION_TASK, STEP_TASK, Spec
 
 _PARTS = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
 

@@ -212,7 +212,7 @@ def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, re
     assert (record.measured["seconds"] < 1e-6).all() == bool(extra)
 
 
-# What else is broken is refused with its sentence: see `test_hostile_entrants`.
+# What else is broken is refused with its sentence: see `test_hostile_solvers`.
 BROKEN = {
     "crashes": "import os; os.abort()",
     "stretches": 'return {"positions": 2.0 * offsets.cumsum(axis=0)}',
@@ -323,7 +323,7 @@ def test_a_seed_draws_other_targets_and_is_on_record(folder):
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
 def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
     """The link `tool` of its URDF is where the bench evaluates poses, at any coordinates."""
-    from plumbob.bench.peers.entrant_robot import robot_inputs
+    from plumbob.bench.peers.user_robot import robot_inputs
     from plumbob.bench.problems.evaluate import evaluator_of
     from plumbob.verify.kinematics.robot_models import tool_pose
     from plumbob.verify.task import TASKS

@@ -22,8 +22,8 @@ from plumbob.bench.harness import timing
 from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
 from plumbob.bench.peers import catalogue
-from plumbob.bench.peers.entrant import Entrant
 from plumbob.bench.peers.protocol import NoAnswerError
+from plumbob.bench.peers.user_solver import Entrant
 from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.reference import Skeleton
 from plumbob.text.sentence import sentence
@@ -91,7 +91,7 @@ def behaviour(words=None, answer=None, pose=True, does="", bench="", **others):
     return Behaviour(does, bench=None if bench is False else bench, **others)
 
 
-TABLE = tomllib.loads(Path(__file__).with_name("hostile_entrants.toml").read_text("utf-8"))
+TABLE = tomllib.loads(Path(__file__).with_name("hostile_solvers.toml").read_text("utf-8"))
 BEHAVIOURS = {name: behaviour(**entry) for name, entry in TABLE.items()}
 
 
