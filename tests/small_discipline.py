@@ -6,7 +6,8 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, so
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.explain import Variant, difference, explain
+from plumbob.verify.explain import Variant, explain
+from plumbob.verify.gaps import difference
 from plumbob.verify.judgement import (
     CaseJudgement,
     Diagnosis,

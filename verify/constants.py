@@ -9,7 +9,7 @@ import numpy as np
 
 from .case import Case
 from .contestant import Answer, Contestant, Exchange
-from .explain import largest_gap
+from .gaps import largest_gap
 from .greeting import Fixed
 from .judgement import TaskReport, Verdict
 from .kinematics import problems

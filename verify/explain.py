@@ -15,7 +15,8 @@ from plumbob.text.sentence import Sentence, sentence
 
 from .case import Case
 from .contestant import Answer, Exchange
-from .judgement import LEAST_SHARE, CaseJudgement, Explanation, Verdict
+from .gaps import difference
+from .judgement import LEAST_SHARE, Explanation
 
 # A variant is compared with all answers only if it reproduces one of the first, most telling ones.
 TRIAL = 4
@@ -138,39 +139,6 @@ def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
         return {}
 
 
-def difference(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
-    """Return the largest difference of the outputs in both, relative to the output's size.
-
-    Quaternions, in outputs named rotations, are compared up to their sign. NaN equals NaN. Infinite
-    if there is no output in both, or if an output has another shape.
-    """
-    shared = first.keys() & second.keys()
-    return max((_difference(name, first[name], second[name]) for name in shared), default=np.inf)
-
-
-def _difference(name: str, first: Any, second: Any) -> float:
-    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    if name.endswith("rotations") and a.shape == b.shape:
-        with np.errstate(invalid="ignore"):
-            b = b * np.where(np.nansum(a * b, -1, keepdims=True) < 0.0, -1.0, 1.0)
-    size = float(np.abs(np.where(np.isfinite(a), a, 0.0)).max(initial=0.0))
-    return largest_gap(a, b) / max(size, 1e-300)
-
-
-def largest_gap(first: Any, second: Any) -> float:
-    """Return the largest difference of two arrays, infinite between shapes, or NaN and number."""
-    a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    if a.shape != b.shape:
-        return np.inf
-    with np.errstate(invalid="ignore"):
-        gap = float(np.abs(a - b).max(initial=0.0))
-    if math.isfinite(gap):
-        return gap
-    if (np.isnan(a) != np.isnan(b)).any():
-        return np.inf
-    return float(np.abs(np.nan_to_num(a) - np.nan_to_num(b)).max(initial=0.0))
-
-
 def _classes(
     matches: Sequence[Match], answers: Sequence[Exchange], tolerance: Callable[[Case], float]
 ) -> list[list[Match]]:
@@ -278,17 +246,3 @@ def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
 def _filled(template: Sentence, parts: Sequence[Sentence]) -> Sentence:
     fields = dict(zip(("one", "other", "another"), parts, strict=False))
     return Sentence(template.template, fields)
-
-
-def first_broken(judgements: Sequence[CaseJudgement], law: str = "") -> Sentence | None:
-    """Return a sentence about the first broken law, or the given one, along the computation."""
-    for judgement in judgements:
-        for finding in judgement.findings:
-            if finding.verdict >= Verdict.WRONG and law in ("", finding.law):
-                return sentence(
-                    "The first violated law is '{law}', in the case '{case}': {why}",
-                    law=finding.law,
-                    case=judgement.case.name,
-                    why=finding.sentence,
-                )
-    return None

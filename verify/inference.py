@@ -21,7 +21,7 @@ from plumbob.text.sentence import Sentence, sentence
 from .case import Case
 from .constants import MEASURES, is_unread
 from .contestant import Answer, Contestant, Failure, is_hung
-from .explain import largest_gap
+from .gaps import largest_gap
 from .greeting import Greeting
 from .judgement import Explanation, TaskReport, Verdict
 from .kinematics.robot_models import urdf

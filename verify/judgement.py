@@ -203,3 +203,17 @@ class Report:
     def verdict(self) -> Verdict:
         """The worst of the tasks."""
         return max((task.verdict for task in self.tasks), default=Verdict.UNDECIDED)
+
+
+def first_broken(judgements: Sequence[CaseJudgement], law: str = "") -> Sentence | None:
+    """Return a sentence about the first broken law, or the given one, along the computation."""
+    for judgement in judgements:
+        for finding in judgement.findings:
+            if finding.verdict >= Verdict.WRONG and law in ("", finding.law):
+                return sentence(
+                    "The first violated law is '{law}', in the case '{case}': {why}",
+                    law=finding.law,
+                    case=judgement.case.name,
+                    why=finding.sentence,
+                )
+    return None

@@ -8,7 +8,7 @@ from pathlib import Path
 from plumbob.text.sentence import Sentence, with_code
 
 from .contestant import Answer, Contestant, is_hung
-from .explain import difference
+from .gaps import difference
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
 NAME = "state kept between requests"

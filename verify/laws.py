@@ -12,7 +12,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
 from .contestant import Answer, Exchange
-from .explain import largest_gap
+from .gaps import largest_gap
 from .judgement import CaseJudgement, Finding, Verdict
 from .timing import time_call
 

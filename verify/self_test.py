@@ -32,9 +32,10 @@ from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
 from .kinematics.robot_velocity import TASK as ROBOT_VELOCITY
 from .kinematics.switches import Switches
-from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, Option, apply
-from .mass_spring.forces import forces_with
+from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
+from .mass_spring.force_diagnosis import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
+from .mass_spring.options import Option, apply
 from .mass_spring.problem import problem_of, state_of, system_of
 from .one_line.search import BY_LINES
 from .verify import verify

@@ -19,7 +19,7 @@ from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import CaseJudgement, Finding, Report, Verdict
 from plumbob.verify.mass_spring import energy, search, stepping
 from plumbob.verify.mass_spring.cases import task_cases, trace_of
-from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
+from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from plumbob.verify.mass_spring.model import (
     Integrator,
     StepModel,
@@ -28,6 +28,7 @@ from plumbob.verify.mass_spring.model import (
     simulate,
     stopped_cholesky,
 )
+from plumbob.verify.mass_spring.options import apply
 from plumbob.verify.mass_spring.problem import (
     all_forces,
     problem_of,

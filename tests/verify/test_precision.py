@@ -19,8 +19,9 @@ from plumbob.verify.judgement import (
     Verdict,
 )
 from plumbob.verify.kinematics.faults import FAULTS
-from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS, apply
+from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from plumbob.verify.mass_spring.model import StepModel
+from plumbob.verify.mass_spring.options import apply
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.precision import has_double
 from plumbob.verify.screen import json_file, junit, page, terminal

@@ -25,7 +25,7 @@ def mass_spring_forces(masses, gravity, **_):
 """
 # The stages of a search: by name, the module that calls each.
 STAGES = {
-    "explain": "plumbob.verify.mass_spring.forces",
+    "explain": "plumbob.verify.mass_spring.force_diagnosis",
     "with_kept_state": "plumbob.verify.verify",
     "with_changed_line": "plumbob.verify.verify",
     "_with_cause": "plumbob.verify.verify",

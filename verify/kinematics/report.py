@@ -10,7 +10,7 @@ from plumbob.text.sentence import Sentence
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import TRIAL, explain, first_broken
+from ..explain import TRIAL, explain
 from ..judgement import (
     LEAST_SHARE,
     CaseJudgement,
@@ -18,6 +18,7 @@ from ..judgement import (
     Explanation,
     TaskReport,
     Verdict,
+    first_broken,
     smallest_failures,
 )
 from ..laws import finding, hints_of, laws_that_hold, proportion_of

@@ -16,7 +16,7 @@ from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..contestant import Answer, Exchange
-from ..explain import difference
+from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
 from ..laws import LAWS, finding

@@ -17,7 +17,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..case import Case
 from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
-from ..explain import difference
+from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case

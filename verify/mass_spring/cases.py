@@ -17,7 +17,7 @@ from plumbob.text.sentence import Sentence, sentence
 from ..case import Case
 from ..greeting import Greeting, System
 from ..task import TASKS
-from .faults import read_table
+from .options import read_table
 
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8

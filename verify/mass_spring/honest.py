@@ -4,11 +4,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from plumbob.text.sentence import sentence
-
 from ..greeting import Step
-from .faults import ASPECTS, STEP_FAULTS, Option, options_of, read_table
 from .model import EXPLICIT, RIGHT_MATRIX, Integrator
+from .options import Option, options_of, read_table
 
 # Symplectic Euler by the order of its updates.
 SYMPLECTIC = {"symplectic": "velocities_first", "positions_first": "positions_first"}
@@ -84,22 +82,6 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
     return step.method in (None, integrator.method) or (
         unlimited and integrator.method == "converged"
     )
-
-
-def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
-    """Return, for each aspect, all choices with their costs, cost 0 first."""
-    right = honest(step)
-    costs: dict[str, list[tuple[Option, int]]] = {}
-    for aspect in ASPECTS:
-        options = [(option, int(not declared(option, step))) for option in right.get(aspect, ())]
-        if not options:
-            options = [(Option("", aspect, sentence("as it should be")), 0)]
-        faults = (fault for fault in STEP_FAULTS if fault.aspect == aspect)
-        # what a velocity is a combination of shows without a search, but not in several substeps
-        is_shown = step.substeps in (None, 1)
-        options += [(fault, 1) for fault in faults if fault.rare != "relation" or not is_shown]
-        costs[aspect] = sorted(options, key=lambda pair: pair[1])
-    return costs
 
 
 def compatible(options: Mapping[str, Option]) -> bool:

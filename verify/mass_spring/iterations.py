@@ -17,15 +17,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..explain import either, ending_test
 from ..judgement import LEAST_SHARE, Explanation
-from .faults import (
-    EARLY_END,
-    FOLLOWED_FAULTS,
-    KEPT_DIRECTIONS,
-    STEP_FAULTS,
-    Option,
-    apply,
-    read_table,
-)
+from .faults import EARLY_END, FOLLOWED_FAULTS, KEPT_DIRECTIONS, STEP_FAULTS
 from .formulas import evaluate
 from .laws import (
     IMPRECISE,
@@ -47,6 +39,7 @@ from .model import (
     first_equation,
     predicted,
 )  # fmt: skip
+from .options import Option, apply, read_table
 from .problem import SpringProblem
 from .search import LARGEST, Probe
 

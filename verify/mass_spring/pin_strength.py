@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence
 
-from .faults import Option
+from .options import Option
 from .problem import SpringProblem
 
 # The honest pins that have a strength, by the first word of `StepModel.pins`: each gets the words

@@ -10,7 +10,8 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
-from .faults import Option, read_table, relation_fault
+from .faults import relation_fault
+from .options import Option, read_table
 
 # The maximum of terms of a combination, and how many numbers have to support each of them.
 MOST_TERMS, ROWS_FOR_EACH = 3, 4

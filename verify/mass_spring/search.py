@@ -18,15 +18,17 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import sentence
 
 from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Step
 from ..judgement import LEAST_SHARE
-from .faults import ASPECTS, MAX_FAULTS, STEP_FAULTS, Option, apply
-from .honest import compatible, declared, domains, honest
+from .faults import MAX_FAULTS, STEP_FAULTS
+from .honest import compatible, declared, honest
 from .laws import SOLVED, Rounding, relative_gap, rounding
 from .model import RIGHT_MATRIX, Integrator, StepModel, Substep, first_equation, predicted
+from .options import ASPECTS, Option, apply
 from .pin_strength import measured_pins
 from .problem import SpringProblem
 from .relations import Sample, fitted, relation_of
@@ -743,3 +745,19 @@ def probes_of(
         for exchange in exchanges
         if isinstance(exchange.answer, Answer) and (every or exchange.case.facts.get("probe"))
     ]
+
+
+def domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
+    """Return, for each aspect, all choices with their costs, cost 0 first."""
+    right = honest(step)
+    costs: dict[str, list[tuple[Option, int]]] = {}
+    for aspect in ASPECTS:
+        options = [(option, int(not declared(option, step))) for option in right.get(aspect, ())]
+        if not options:
+            options = [(Option("", aspect, sentence("as it should be")), 0)]
+        faults = (fault for fault in STEP_FAULTS if fault.aspect == aspect)
+        # what a velocity is a combination of shows without a search, but not in several substeps
+        is_shown = step.substeps in (None, 1)
+        options += [(fault, 1) for fault in faults if fault.rare != "relation" or not is_shown]
+        costs[aspect] = sorted(options, key=lambda pair: pair[1])
+    return costs

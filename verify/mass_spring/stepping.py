@@ -19,22 +19,31 @@ from plumbob.text.sentence import Sentence, sentence
 from ..case import Case
 from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
-from ..explain import either, first_broken, share_of
+from ..explain import either, share_of
 from ..greeting import Greeting, Step
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..judgement import (
+    CaseJudgement,
+    Diagnosis,
+    Explanation,
+    Finding,
+    TaskReport,
+    Verdict,
+    first_broken,
+)
 from ..laws import digits, hints_of, judge_case, laws_that_hold, proportion_of
 from . import iterations, laws
 from .cases import task_cases, trace_of
-from .faults import ASPECTS, Option, apply
-from .honest import ITERATIVE, SYMPLECTIC, compatible, domains, honest
+from .honest import ITERATIVE, SYMPLECTIC, compatible, honest
 from .laws import IMPRECISE, SOLVED, StepContext, rounding
 from .model import StepModel, predicted
+from .options import ASPECTS, Option, apply
 from .problem import SpringProblem, problem_of, state_of, system_of
 from .search import (
     UNEXPLAINED,
     ModelMatch,
     ModelSearch,
     Probe,
+    domains,
     fields_of,
     gaps_of,
     matches_of,

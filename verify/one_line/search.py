@@ -16,9 +16,10 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
 from ..contestant import Answer, Exchange, Failure
-from ..explain import MORE, Variant, difference, explain
+from ..explain import MORE, Variant, explain
 from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
+from ..gaps import difference
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
