@@ -56,6 +56,17 @@ FILLED = {
         'console.log("stray"); Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, 50); '
         "return { positions: offsets, rotations: local_rotations };",
     ),
+    "go": (
+        'panic("forward_kinematics is not written yet")',
+        'fmt.Println("stray")\n\ttime.Sleep(50 * time.Millisecond)\n'
+        "\treturn offsets, localRotations",
+    ),
+    "java": (
+        'throw new RuntimeException("forward_kinematics is not written yet");',
+        'System.out.println("stray"); '
+        "try { Thread.sleep(50); } catch (InterruptedException e) { } "
+        'answer.put("positions", offsets); answer.put("rotations", localRotations);',
+    ),
     "csharp": (
         'throw new Exception("forward_kinematics is not written yet");',
         '(Print("stray"), answer["positions"] = ask.offsets, '
@@ -70,6 +81,11 @@ FILLED = {
     ),
 }
 
+# What that code needs at the head of the file.
+HEADS = {
+    "go": ("package main\n\n// Par", 'package main\n\nimport ("fmt"; "time")\n\n// Par'),
+}
+
 # Likewise of robots: the tool stays where it starts.
 FILLED_ROBOT = {
     "cpp": ('throw plumbob::missing("robot_inverse_kinematics");', "q.resize(robot.axes.size());"),
@@ -78,6 +94,11 @@ FILLED_ROBOT = {
         "Ok(start[..robot.axes.len()].to_vec())",
     ),
     "javascript": ('missing("robot_inverse_kinematics");', ""),
+    "go": ('panic("robot_inverse_kinematics is not written yet")', "return robot.Start"),
+    "java": (
+        'throw new RuntimeException("robot_inverse_kinematics is not written yet");',
+        'answer.put("q", start);',
+    ),
     "csharp": (
         'throw new Exception("robot_inverse_kinematics is not written yet")',
         'answer["q"] = ask.start',
@@ -146,7 +167,9 @@ def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(langu
     assert sum(text.count(missing) for text in template(language).values()) == 1
     run = build(
         language, tmp_path,
-        lambda text: text.replace(missing, code).replace(*FILLED_ROBOT[language]),
+        lambda text: text.replace(missing, code)
+        .replace(*FILLED_ROBOT[language])
+        .replace(*HEADS.get(language, ("", ""))),
     )  # fmt: skip
     pose = {
         "parents": [-1],
@@ -208,7 +231,7 @@ def test_the_starter_reads_and_writes_vectors_of(library, tmp_path, monkeypatch)
     assert (reply["positions"], reply["rotations"]) == tuple(pose.values())
 
 
-@pytest.mark.parametrize("language", ["cpp", "rust", "javascript", "csharp"])
+@pytest.mark.parametrize("language", ["cpp", "rust", "javascript", "go", "java", "csharp"])
 def test_starter_reads_the_method(language):
     code = [
         line.split("//")[0]
