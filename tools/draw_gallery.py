@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 from plumbob.bench.motion.motion import Scene
 from plumbob.bench.show import picture, scenes
-from plumbob.bench.show.scene_solver import YourSolver
+from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.bench.show.scenes import CLOTH, EXACT
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
@@ -76,11 +76,11 @@ def beside_truth(solver: str, faults: Sequence[FamousFault]) -> Scene:
     return scenes.arm_scene(CURVE, arm, name, list(zip(titles, x, strict=True)))
 
 
-def solver_of(fault: FamousFault) -> YourSolver:
+def solver_of(fault: FamousFault) -> SceneSolver:
     """Return the solver that has a fault."""
     subject = subject_of(fault)
-    contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
-    return YourSolver(fault.title, contestant)
+    solver = FunctionContestant({subject.task: subject.function}, subject.greeting)
+    return SceneSolver(fault.title, solver)
 
 
 def subject_of(fault: FamousFault) -> Subject:

@@ -50,7 +50,9 @@ def _with_solvers(scale: Any, solvers: list[str], suites: list[str]) -> Any:
     from plumbob.bench.peers import opening
 
     try:
-        return replace(scale, entrants=tuple(opening.opened(opening.addresses(solvers), suites)))
+        return replace(
+            scale, user_solvers=tuple(opening.open_solvers(opening.addresses(solvers), suites))
+        )
     except ValueError as error:
         sys.exit(str(error))
 

@@ -190,7 +190,7 @@ def residuals_chart(results: Results) -> Sketch | None:
         Panel(group[0].title, tuple(map(_residuals, group)), group[0].values.tolerance)
         for group in histories(results)
     )
-    return declared_chart(_CAPTIONS.figure("ik_residuals"), panels, results.entrants)
+    return declared_chart(_CAPTIONS.figure("ik_residuals"), panels, results.user_solvers)
 
 
 def _residuals(record: Record) -> Series:

@@ -22,7 +22,7 @@ from ..harness.record import Record
 from ..harness.values import Floats1, Integers1, Values
 from ..peers.axes import REVOLUTION, all_within
 from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
-from ..peers.protocol import Ask
+from ..peers.protocol import SolveFactory
 from ..problems.evaluate import Targets, angle_between, evaluator_of
 from ..problems.robot_targets import STRATA, robot_targets
 from ..problems.robots import ROBOTS, UnableError, is_installed, robot, title
@@ -101,14 +101,17 @@ def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[s
     """Return by module the numbers of its lists, or why the solver does not take the robot."""
     targets = robot_targets(name, count, seed)
     results: dict[str, Any] = {}
-    asks: dict[str, Ask] = {}
+    factories: dict[str, SolveFactory] = {}
     for module in modules:
         try:
-            asks[module] = importlib.import_module(module).prepare_all(robot(name))
+            factories[module] = importlib.import_module(module).prepare_all(robot(name))
         except UnableError as error:
             results[module] = {"remark": str(error)}
     requests = [targets.request(i) for i in range(len(targets.starts))]
-    solves = {module: [ask(request) for request in requests] for module, ask in asks.items()}
+    solves = {
+        module: [make_solve(request) for request in requests]
+        for module, make_solve in factories.items()
+    }
     rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
     errors = {m: [_errors(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
     exact = ([q[e <= EXACT] for q, e in zip(rows[m], errors[m], strict=True)] for m in rows)

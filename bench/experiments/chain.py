@@ -90,10 +90,10 @@ def blocks(scale: Scale) -> Iterator[Block]:
         if own.targets is not None:
             yield from (b.on(own) for b in _blocks_on(own.targets, "yours", limits, scale))
     facts = {"task": CHAIN, "stratum": BEYOND, "title": "every chain"}
-    for entrant in scale.entrants:
-        if entrant.offers(SUITE) and CHAIN_TASK not in entrant.tasks:
+    for solver in scale.user_solvers:
+        if solver.offers(SUITE) and CHAIN_TASK not in solver.tasks:
             measure = partial(not_asked, NO_BALLS)
-            yield Block(SUITE, "chain/all", entrant.name, measure, facts=facts).of(entrant)
+            yield Block(SUITE, "chain/all", solver.name, measure, facts=facts).of(solver)
 
 
 def _blocks_on(
@@ -288,8 +288,8 @@ def iterations_chart(results: Results) -> Sketch | None:
     groups = ([r for r in group if reported_iterations(r).size] for group in histories(results))
     panels = [Panel(group[0].title, tuple(map(_reached, group))) for group in groups if group]
     chart = _CAPTIONS.figure("iterations")
-    chart["shows"] += " Entrants claim their iterations." * bool(results.entrants)
-    return declared_chart(chart, panels, results.entrants)
+    chart["shows"] += " Users’ solvers claim their iterations." * bool(results.user_solvers)
+    return declared_chart(chart, panels, results.user_solvers)
 
 
 def histories(results: Results) -> list[list[Record]]:

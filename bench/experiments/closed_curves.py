@@ -250,7 +250,7 @@ def jitter_chart(results: Results) -> Sketch | None:
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
     rows = tuple(str(records[0].values.curve) for records in curves.values())
     panels = [Panel("", tuple(spans))] if spans else []
-    return declared_chart(_CAPTIONS.figure("jitter"), panels, results.entrants, rows=rows)
+    return declared_chart(_CAPTIONS.figure("jitter"), panels, results.user_solvers, rows=rows)
 
 
 jitter = _CAPTIONS.layout("q3_jitter", _curves, _summary, columns=COLUMNS, figures=(jitter_chart,))

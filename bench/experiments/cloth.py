@@ -311,7 +311,7 @@ def convergence_chart(results: Results) -> Sketch | None:
         for records in cloths
     )
     chart = CAPTIONS.figure("cloth_convergence")
-    return declared_chart(chart, panels, results.entrants, columns=len(cloths))
+    return declared_chart(chart, panels, results.user_solvers, columns=len(cloths))
 
 
 convergence = CAPTIONS.layout(

@@ -150,7 +150,7 @@ class ClothJob(NamedTuple):
     start: State
     settings: Mapping[str, Any]  # of the adapter
     shape: Shape
-    entrant: str = ""  # the name of a user's solver, whose first error is announced
+    user_solver: str = ""  # the name of a user's solver, whose first error is announced
 
     def perform(self) -> Iterator[Message]:
         """Yield the positions and the time of each frame as soon as computed."""
@@ -158,7 +158,11 @@ class ClothJob(NamedTuple):
 
     def set_up(self, adapter: Any) -> tuple[Mover, Ready]:
         """Return the solver for the cloth, and how long its set-up took."""
-        code = self.module, self.entrant, *(v for v in self.settings.values() if isinstance(v, str))
+        code = (
+            self.module,
+            self.user_solver,
+            *(v for v in self.settings.values() if isinstance(v, str)),
+        )
         if code not in _compiled:
             small, state = scenes.grid_cloth(_SMALL, _SMALL)
             trial = adapter.prepare(small, _SHORT, **self.settings)
@@ -254,7 +258,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
     Each missing package has a block. Larger cloths and the cloth of Liu et al. are for the full
     scale.
     """
-    peers = catalogue.cloth_peers(scale.entrants)
+    peers = catalogue.cloth_peers(scale.user_solvers)
     for package in dict.fromkeys(peer.package for peer in peers if not peer.is_installed):
         yield _block(MISSING, "all", package, partial(not_installed, package), {})
     installed = [peer for peer in peers if peer.is_installed]
@@ -309,7 +313,7 @@ def _works(peer: Peer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
         facts = {"kind": peer.run.kind, "arbiter": _ARBITERS[task]}
         facts |= {"cloth": cloth.name} if cloth.own else {}
         name, more = f"{name}/{cloth.name}", {"size": size, "facts": facts}
-        block = _block(task, name, peer.title, measure, settings, **more).of(peer.entrant)
+        block = _block(task, name, peer.title, measure, settings, **more).of(peer.user_solver)
         yield block.on(cloth.own) if cloth.own else block
 
 
@@ -320,7 +324,7 @@ def _stability_blocks(peer: Peer, sizes: tuple[Level, ...]) -> Iterator[Block]:
         measure, size = partial(stability, peer, stiffnesses), len(stiffnesses)
         version = {"size": STABILITY_SIZE, "version": peer.version}
         block = _block(STABILITY, "stability", peer.title, measure, version, size=size)
-        yield block.of(peer.entrant)
+        yield block.of(peer.user_solver)
 
 
 class Rung(NamedTuple):
@@ -481,8 +485,8 @@ def is_stable(peer: Peer, system: MassSpring, start: State, rest: np.ndarray, h:
     """
     settings = {**peer.run.settings, **peer.spec, "substeps": STABILITY_STEPS}
     shape = Shape(1, 1, h * STABILITY_STEPS)
-    arrays, entrant = system.arrays, peer.entrant_name
-    job = ClothJob(peer.module, arrays, start, settings, shape, entrant)
+    arrays, user_solver = system.arrays, peer.user_solver_name
+    job = ClothJob(peer.module, arrays, start, settings, shape, user_solver)
     outcome = worker_process().perform(job)
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
@@ -530,7 +534,7 @@ def liu_2013(solver: str) -> Measured:
 def job(peer: Peer, cloth: FallingCloth, settings: Mapping[str, Any], shape: Shape) -> ClothJob:
     """Return the job of moving a cloth from its start."""
     system = cloth.system.arrays
-    return ClothJob(peer.module, system, cloth.start, settings, shape, peer.entrant_name)
+    return ClothJob(peer.module, system, cloth.start, settings, shape, peer.user_solver_name)
 
 
 @functools.cache
@@ -670,7 +674,7 @@ def work_precision(name: str, task: str, results: Results) -> Sketch | None:
     own = grouped((point for point in visible if point.own), lambda point: point.own)
     panels += [Panel(cloth, _curves(group)) for cloth, group in own.items()]
     columns = len(stiffnesses) or len(panels)
-    return declared_chart(CAPTIONS.figure(name), panels, results.entrants, columns=columns)
+    return declared_chart(CAPTIONS.figure(name), panels, results.user_solvers, columns=columns)
 
 
 step_chart = partial(work_precision, "work_precision_step", ONE_STEP)

@@ -140,7 +140,7 @@ def energy_chart(results: Results) -> Sketch | None:
         Panel(group[0].title, tuple(series(r.solver, r.values.time, r.values.left) for r in group))
         for group in by_problem(results.all("energy")).values()
     )
-    return declared_chart(CAPTIONS.figure("energy"), panels, results.entrants)
+    return declared_chart(CAPTIONS.figure("energy"), panels, results.user_solvers)
 
 
 energy = CAPTIONS.layout(

@@ -177,7 +177,7 @@ CAPTIONS = Captions(__file__)
 SHADES = 40
 # Frames beside each other in the filmstrip.
 FILMSTRIP = 3
-# Motions of a kind on the page, entrants first: a cloth adds some 60 kB to the page.
+# Motions of a kind on the page, users’ solvers first: a cloth adds some 60 kB to the page.
 MAX_ARMS, MAX_CLOTHS = 6, 4
 # Time in which the arm draws the curve [s].
 DRAWING = 12.0
@@ -297,9 +297,9 @@ def _cloth(record: Record) -> Moving:
 
 
 def _first(results: Results, task: str, maximum: int) -> Sequence[Record]:
-    """Return the visible records of a task: entrants first, then in their order."""
+    """Return the visible records of a task: users’ solvers first, then in their order."""
     records = results.all("pictures", task=task)
-    order = sorted(records, key=lambda r: (r.solver not in results.entrants, r.values.order))
+    order = sorted(records, key=lambda r: (r.solver not in results.user_solvers, r.values.order))
     return order[:maximum]
 
 

@@ -231,7 +231,7 @@ def _of_fabrik(record: Record) -> Iterator[PublishedNumber]:
         row = row._replace(mark="iterations not reported")
         yield from (row.of("iterations, mean", number), row.of("iterations, largest", None))
         return
-    row = row._replace(targets=counts.size, mark="claimed" * record.is_entrant)
+    row = row._replace(targets=counts.size, mark="claimed" * record.is_user_solver)
     yield row.of("iterations, mean", number, metrics.mean_interval(counts))
     yield row.of("iterations, largest", None, [float(counts.max())])
 

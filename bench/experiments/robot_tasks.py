@@ -60,23 +60,23 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def meet(name: str, task_name: str, peer: Peer, kind: str, count: int, seed: int) -> Measured:
-    """Ask a solver for all targets, from one start or with restarts; MuJoCo evaluates them."""
+    """Solve all targets by a solver, from one start or with restarts; MuJoCo evaluates them."""
     announce(f"{task_name}, {name}, {peer.title}")
     arm, task, entry = robot(name), ROBOT_TASKS[task_name], peer.first(kind)
     module, settings = importlib.import_module(peer.module), entry.settings
     if peer is PLUMBOB_LM:
         settings = {"restarts": settings["restarts"]}
     try:
-        ask = module.prepare_task(arm, task, TOLERANCE, **settings)
+        make_solve = module.prepare_task(arm, task, TOLERANCE, **settings)
     except UnableError as error:
         return {"remark": str(error)}
     if entry.restarts:
-        ask = restarted(ask, arm, entry.restarts)
+        make_solve = restarted(make_solve, arm, entry.restarts)
     rng = np.random.default_rng([seed, seed_of(name)])
     pairs = (arm.draw(rng, count) for _ in range(2))
     requests = [TaskRequest(goal, start) for goal, start in zip(*pairs, strict=True)]
-    attempt(ask(requests[0]))  # whatever is loaded or compiled with the first call
-    outputs = [attempt(ask(request)) for request in requests]
+    attempt(make_solve(requests[0]))  # whatever is loaded or compiled with the first call
+    outputs = [attempt(make_solve(request)) for request in requests]
     evaluator, no_answer = evaluator_of(name), np.full(len(arm.lower), np.inf)
     rows = [no_answer if output.q is None else output.q for output in outputs]
     solved = [

@@ -151,7 +151,7 @@ class RobotJob(NamedTuple):
         settings = {**self.entry.settings, **self.peer.spec}
         model, restarts = evaluator_of(self.robot).robot, self.entry.restarts
         request = (self.peer.module, model, self.targets(), self.tolerance, settings, restarts)
-        return Job(*request, self.peer.entrant_name)
+        return Job(*request, self.peer.user_solver_name)
 
     def block(self, problem: str, facts: dict[str, Any]) -> Block:
         """Return the block of a problem; only its settings change an answer.
@@ -172,7 +172,7 @@ class RobotJob(NamedTuple):
         group = Group(problem, solve_together, self)
         block = Block(SUITE, problem, solver, group.measure_alone, settings, self.size, facts)
         block = block if self.entry.has_time_limit else dataclasses.replace(block, group=group)
-        return block.of(self.peer.entrant)
+        return block.of(self.peer.user_solver)
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -186,16 +186,16 @@ def blocks(scale: Scale) -> Iterator[Block]:
         if name not in installed:
             absent, facts = partial(not_installed, PACKAGE), _facts(REACHABLE, title(name))
             yield Block(SUITE, f"robots/{name}", "all solvers", absent, _ANY, 0, facts)
-    peers = catalogue.robot_peers(scale.entrants)
+    peers = catalogue.robot_peers(scale.user_solvers)
     robots = [*installed, *own]
     groups = ("robots", "unreachable")
     owners = {f"{group}/{name}": problem for name, problem in own.items() for group in groups}
     for block in _drawn(block for peer in peers for block in _blocks_of(peer, robots, scale)):
         yield block.on(owners[block.problem]) if block.problem in owners else block
-    for entrant in scale.entrants:
-        if entrant.offers(SUITE) and ROBOT_TASK not in entrant.tasks:
+    for solver in scale.user_solvers:
+        if solver.offers(SUITE) and ROBOT_TASK not in solver.tasks:
             measure, facts = partial(not_asked, NO_ROBOTS), _facts(REACHABLE, "every robot")
-            yield Block(SUITE, "robots/all", entrant.name, measure, _ANY, 0, facts).of(entrant)
+            yield Block(SUITE, "robots/all", solver.name, measure, _ANY, 0, facts).of(solver)
 
 
 def _facts(task: str, title: str) -> dict[str, Any]:
@@ -371,7 +371,7 @@ from ..tables.columns import folded, number, text, words_in
 from ..tables.layout import Figure, Layout
 from ..tables.results import Results, counted, first_of_kinds, grouped, leaders, listed, only_first
 from ..tables.table import INTERVAL, Column, Summary, listing, words
-from ..tables.user_solvers import entrant_table
+from ..tables.user_solvers import user_solver_table
 
 CAPTIONS = Captions(
     __file__,
@@ -433,7 +433,7 @@ def _participants(results: Results) -> Iterator[Participant]:
     """Yield the peers with records, and the solvers entered by users."""
     records = [r for start in STARTS for r in results.all("ik", task=REACHABLE, kind=start)]
     robots = {record.title: record for record in records if "solved" in record.measured}
-    users = {r.solver: _as_peer(r) for r in records if r.is_entrant}
+    users = {r.solver: _as_peer(r) for r in records if r.is_user_solver}
     for peer in (*catalogue.PEERS, *users.values()):
         names = set(map(peer.label_of, peer.runs))
         if own := tuple(record for record in records if record.solver in names):
@@ -442,8 +442,8 @@ def _participants(results: Results) -> Iterator[Participant]:
 
 def _as_peer(record: Record) -> Peer:
     """Return a user's solver in the form of the bench's solvers."""
-    door = str(record.measured.get("door", ""))
-    return Peer(record.solver, "", door, "", "", "", (Run(record.values.kind),))
+    address = str(record.measured.get("door", ""))
+    return Peer(record.solver, "", address, "", "", "", (Run(record.values.kind),))
 
 
 def _entry(entry: Run) -> str:
@@ -554,7 +554,7 @@ def _chart(
     chart = _declared(name, every[0].start if every else "")
     sample = scores.sample([score for field in fields_shown.values() for score in field])
     title = f"{chart['title']} ({sample})"
-    return declared_chart({**chart, "title": title}, panels, results.entrants)
+    return declared_chart({**chart, "title": title}, panels, results.user_solvers)
 
 
 def _declared(name: str, start: str) -> dict[str, Any]:
@@ -851,4 +851,4 @@ unreachable = _layout(
     summary=_unreachable_summary,
 )
 
-LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, entrant_table)
+LAYOUTS = (participants, over_all, robot_by_robot, outcomes, unreachable, user_solver_table)

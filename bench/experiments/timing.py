@@ -386,7 +386,7 @@ def timing_chart(subject: str, unit: str, results: Results) -> Sketch | None:
     )
     rows = tuple(group[0].title for group in works.values())
     chart, panels = CAPTIONS.figure(f"timing_{subject}"), [Panel("", tuple(by_solver))]
-    return declared_chart(chart, panels, results.entrants, rows=rows)
+    return declared_chart(chart, panels, results.user_solvers, rows=rows)
 
 
 def _marks(solver: str, records: Sequence[Record], works: list[str], scale: float) -> Series:

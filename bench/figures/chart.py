@@ -105,7 +105,7 @@ class Chart:
         columns: number of panels beside each other.
         rows: names of rows from above; () if y is a quantity.
         better: whether lower or higher curves are better.
-        entrants: solvers that are always labelled.
+        user_solvers: solvers that are always labelled.
         hollow, filled: meaning of the two marks of a span.
     """
 
@@ -118,7 +118,7 @@ class Chart:
     columns: int = 3
     rows: tuple[str, ...] = ()
     better: str = LESS
-    entrants: frozenset[str] = frozenset()
+    user_solvers: frozenset[str] = frozenset()
     hollow: str = ""
     filled: str = ""
 
@@ -129,7 +129,7 @@ class Chart:
 
     @cached_property
     def labelled(self) -> list[str]:
-        """The labelled solvers: all, or the entrants, the best of each side, and the next best.
+        """The labelled solvers: all, or the user’s, the best of each side, and the next best.
 
         The sides are Plumbob's solvers and all others.
         """
@@ -138,9 +138,9 @@ class Chart:
             return names
         costs = self.costs()
         ranked = sorted(names, key=lambda name: costs[name])
-        firsts = [name for name in ranked if name in self.entrants]
+        firsts = [name for name in ranked if name in self.user_solvers]
         for side in (True, False):
-            peers = [name for name in ranked if name not in self.entrants]
+            peers = [name for name in ranked if name not in self.user_solvers]
             firsts += [name for name in peers if catalogue.is_ours(name) == side][:1]
         labelled = list(dict.fromkeys([*firsts, *ranked]))[:MAX_LABELLED]
         return [name for name in names if name in labelled]

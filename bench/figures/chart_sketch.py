@@ -24,13 +24,16 @@ def _draw_chart(chart: Chart) -> "Figure":
 
 
 def declared_chart(
-    declared: Mapping[str, Any], panels: Iterable[Panel], entrants: frozenset[str], **fields: Any
+    declared: Mapping[str, Any],
+    panels: Iterable[Panel],
+    user_solvers: frozenset[str],
+    **fields: Any,
 ) -> Sketch | None:
     """Return the sketch of a chart declared in a file of captions; None without panels.
 
     `fields` are the undeclared or different fields of `Chart`.
     """
-    chart = {"panels": tuple(panels), "entrants": entrants, **declared, **fields}
+    chart = {"panels": tuple(panels), "user_solvers": user_solvers, **declared, **fields}
     for name in ("x", "y"):
         axis = {"limits": (), **chart.get(name, {})}
         chart[name] = Axis(**{**axis, "limits": (*axis["limits"], None, None)[:2]})

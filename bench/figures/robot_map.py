@@ -85,7 +85,7 @@ def _map(start: str, quantity: str, fields: dict[str, list[Score]], results: Res
     for solver in dict.fromkeys(solver for solver, _ in scores):
         pairs = (scores.get((solver, robot)) for robot in robots)
         cells = [cell(score) if score else None for score in pairs]
-        rows.append(MapRow(solver, solver in results.entrants, cells))
+        rows.append(MapRow(solver, solver in results.user_solvers, cells))
     rows.sort(key=lambda row: -sum(cell.shade for cell in row.cells if cell))
     groups = [(group, len(members)) for group, members in by_group.items()]
     sizes = {s.total if quantity == SOLVED else s.seconds.size for s in scores.values()} - {0}

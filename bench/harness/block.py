@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ..peers.user_solver import Entrant
+from ..peers.user_solver import UserSolver
 
 if TYPE_CHECKING:
     from ..problems.own import OwnProblem
@@ -36,7 +36,7 @@ class Scale:
     seconds: float  # of a benchmark
     seed: int = SEED  # of random targets
     seeds: int = 1  # that reachable targets of robots are drawn from, this one and the following
-    entrants: tuple[Entrant, ...] = ()  # the user's solvers, beside the registered ones
+    user_solvers: tuple[UserSolver, ...] = ()  # the user's solvers, beside the registered ones
     problems: "tuple[OwnProblem, ...]" = ()  # the user's problems, likewise
 
 
@@ -66,13 +66,13 @@ class Block:
     budget: float = 0.0  # the time that bounds the work [s]; 0 if none does
     group: Group | None = None  # the blocks that it is best measured with
 
-    def of(self, entrant: Entrant | None) -> "Block":
+    def of(self, solver: UserSolver | None) -> "Block":
         """Return the block of a user's solver, with its version, facts and conditions."""
-        if entrant is None:
+        if solver is None:
             return self
-        settings = {**self.settings, "version": entrant.version}
-        facts = {**self.facts, "entrant": True, "door": entrant.door, "digest": entrant.digest}
-        conditions = {"solver_commit": entrant.commit}
+        settings = {**self.settings, "version": solver.version}
+        facts = {**self.facts, "entrant": True, "door": solver.address, "digest": solver.digest}
+        conditions = {"solver_commit": solver.commit}
         return replace(self, settings=settings, facts=facts, conditions=conditions)
 
     def on(self, problem: "OwnProblem") -> "Block":

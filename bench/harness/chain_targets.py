@@ -76,11 +76,11 @@ def blocks_of_users(
     problem: chains.TargetsForSkeleton, limits: SolverLimits, scale: Scale, followed: bool = False
 ) -> Iterator[Block]:
     """Yield targets for each method of users' solvers."""
-    for peer in catalogue.chain_peers(scale.entrants):
+    for peer in catalogue.chain_peers(scale.user_solvers):
         settings = {**peer.run.settings, **peer.spec}
-        job = job_of(problem, limits, peer.module, settings, peer.entrant_name)
+        job = job_of(problem, limits, peer.module, settings, peer.user_solver_name)
         answers = partial(solve_one_by_one, problem, job, limits, followed=followed)
-        yield ChainJob(answers, job).block(problem, peer.title, limits).of(peer.entrant)
+        yield ChainJob(answers, job).block(problem, peer.title, limits).of(peer.user_solver)
 
 
 def job_of(
@@ -88,12 +88,12 @@ def job_of(
     limits: SolverLimits,
     module: str,
     settings: dict[str, str],
-    entrant: str = "",
+    user_solver: str = "",
 ) -> Job:
     """Return the job of an adapter with these settings."""
     requests = chains.ChainRequests(problem, np.full(len(problem.targets), limits.max_iterations))
     model = (module, problem.skeleton, requests, limits.tolerance, settings)
-    return Job(*model, entrant=entrant, warms_up=False)
+    return Job(*model, user_solver=user_solver, warms_up=False)
 
 
 def solve_targets(

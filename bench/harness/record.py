@@ -158,7 +158,7 @@ class Record:
         return str(self.measured.get("remark", ""))
 
     @property
-    def is_entrant(self) -> bool:
+    def is_user_solver(self) -> bool:
         """Whether its solver was entered by a user."""
         return self.measured.get("entrant") is True
 

@@ -1,6 +1,6 @@
 """A timed solve, from the adapter to the record: attempts, restarts, jobs, and rounds of turns.
 
-An adapter's `ask(request)` converts a target and returns a solve, which is timed by `clock`. A
+An adapter's `make_solve(request)` converts a target and returns a solve, timed by `clock`. A
 `Job` sets a solver up in the worker's process and solves all targets in order. Afterwards the
 solvers of the same targets are timed in turns, each turn a job of its own.
 """
@@ -21,12 +21,12 @@ import numpy as np
 from .. import clock
 from ..peers.connection import remark
 from ..peers.protocol import (
-    Ask,
     BenchRobot,
     NoAnswerError,
     OwnTime,
     PoseRequest,
     Solve,
+    SolveFactory,
     SolverOutput,
     UnableError,
     describe,
@@ -67,7 +67,7 @@ def attempt(solve: Callable[[], SolverOutput]) -> SolverOutput:
     return output._replace(time=output.time or OwnTime(seconds))
 
 
-def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
+def restarted(make_solve: SolveFactory, robot: BenchRobot, restarts: int) -> SolveFactory:
     """Return a solver with up to `restarts` further attempts from seeded random poses.
 
     An attempt succeeds by claiming an answer within the limits, which some solvers ignore; an
@@ -80,9 +80,9 @@ def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
         q = output.q
         return bool(output.claim) and q is not None and all(np.clip(q, *limits) == q)
 
-    def ask_again(request: PoseRequest) -> Callable[[], SolverOutput]:
+    def make_restarts(request: PoseRequest) -> Callable[[], SolverOutput]:
         poses = robot.draw(np.random.default_rng([_SEED, digest_of(*request)]), restarts)
-        attempts = [ask(request._replace(start=q.copy())) for q in (request.start, *poses)]
+        attempts = [make_solve(request._replace(start=q.copy())) for q in (request.start, *poses)]
 
         def solve() -> SolverOutput:
             outputs: list[SolverOutput] = []
@@ -97,7 +97,7 @@ def restarted(ask: Ask, robot: BenchRobot, restarts: int) -> Ask:
 
         return solve
 
-    return ask_again
+    return make_restarts
 
 
 def digest_of(*target: Any) -> int:
@@ -122,23 +122,23 @@ def seed_shared_generators(seed: int) -> None:
 def messages_of(job: Any) -> Iterator[Message]:
     """Yield the messages of a job, which sets up a solver of a module and yields its answers.
 
-    The first trouble of a user's solver, the `entrant`, is announced ahead of its target.
+    The first trouble of a user's solver, `user_solver`, is announced ahead of its target.
     """
-    entrant, is_silent = job.entrant, bool(job.entrant)
+    user_solver, is_silent = job.user_solver, bool(job.user_solver)
     try:
         adapter = importlib.import_module(job.module)
         solver, ready = job.set_up(adapter)
-        yield replace(ready, remark=remark() if entrant else "")
+        yield replace(ready, remark=remark() if user_solver else "")
         for answer in job.answers(solver):
             trouble = answer.trouble or answer.time.doubt
             if is_silent and trouble:
-                yield Progress(entrant, TROUBLE, trouble)
+                yield Progress(user_solver, TROUBLE, trouble)
                 is_silent = False
             yield answer
         yield Finished()
     except Exception as error:  # an exception of an engine is its result
-        if entrant and isinstance(error, NoAnswerError):
-            yield Progress(entrant, TROUBLE, describe(error))
+        if user_solver and isinstance(error, NoAnswerError):
+            yield Progress(user_solver, TROUBLE, describe(error))
         yield Finished(str(error) if isinstance(error, UnableError) else describe(error))
 
 
@@ -153,56 +153,56 @@ class Job(NamedTuple):
     tolerance: Any  # when a target counts as reached
     settings: Mapping[str, Any]  # of the adapter
     restarts: int = 0  # further attempts from random poses, made here for solvers without restarts
-    entrant: str = ""  # the name of a user's solver, to announce its first trouble; else ""
+    user_solver: str = ""  # the name of a user's solver, to announce its first trouble; else ""
     warms_up: bool = True  # whether the first target is solved once before, uncounted
 
     @property
     def budget(self) -> float:
         """The time after which a user's solver begins no further target [s]."""
         seconds = max(_LEAST_SECONDS, _TARGET_SECONDS * self.targets.shape[0])
-        return seconds if self.entrant else math.inf
+        return seconds if self.user_solver else math.inf
 
     def perform(self) -> Iterator[Message]:
         """Yield the answers to all targets."""
         return messages_of(self)
 
-    def set_up(self, adapter: Any) -> tuple[Ask, Ready]:
+    def set_up(self, adapter: Any) -> tuple[SolveFactory, Ready]:
         """Return the function of the adapter that takes requests, and how long that took."""
-        ask, setup = clock.time_call(lambda: self.prepared(adapter))
-        first = self.solve(ask, 0)() if self.warms_up else None
+        make_solve, setup = clock.time_call(lambda: self.prepared(adapter))
+        first = self.solve(make_solve, 0)() if self.warms_up else None
         if self.restarts and first is not None and first.claim < 0:
             raise UnableError("not started again, for it claims nothing of its answers")
-        return ask, Ready(setup, overhead=self._overhead(adapter))
+        return make_solve, Ready(setup, overhead=self._overhead(adapter))
 
-    def prepared(self, adapter: Any) -> Ask:
+    def prepared(self, adapter: Any) -> SolveFactory:
         """Return the function of the adapter that takes requests, with restarts."""
-        ask: Ask = adapter.prepare(self.model, self.tolerance, **self.settings)
-        return restarted(ask, self.model, self.restarts) if self.restarts else ask
+        make_solve: SolveFactory = adapter.prepare(self.model, self.tolerance, **self.settings)
+        return restarted(make_solve, self.model, self.restarts) if self.restarts else make_solve
 
     def _overhead(self, adapter: Any) -> float:
         """Return the part of a solve's time outside the solver [s], NaN of users' solvers."""
-        if self.entrant or not self.warms_up:
+        if self.user_solver or not self.warms_up:
             return math.nan
         if not getattr(adapter, "METERED", False):  # a single call
             return clock.overhead(lambda: Solve(lambda: None, lambda q: (q, None)))
         job = self._replace(restarts=0)
         return clock.overhead(lambda: job.prepared(adapter)(self.targets.request(0)))
 
-    def answers(self, ask: Ask) -> Iterator[Solved]:
+    def answers(self, make_solve: SolveFactory) -> Iterator[Solved]:
         """Solve the targets in order, until the budget is spent."""
         duration = 0.0
         for i in range(self.targets.shape[0]):
-            answer = self.solve(ask, i)()
+            answer = self.solve(make_solve, i)()
             yield answer
             duration += answer.duration
             if duration > self.budget:
                 break
 
-    def solve(self, ask: Ask, i: int) -> Callable[[], Solved]:
+    def solve(self, make_solve: SolveFactory, i: int) -> Callable[[], Solved]:
         """Return the solve of a target, which is converted before the clock runs."""
         request = self.targets.request(i)
         try:
-            solve = ask(request)
+            solve = make_solve(request)
         except Exception as error:
             solve = partial(SolverOutput, None, False, OwnTime(0.0), describe(error))
         return partial(self._solved, solve, digest_of(*request))
@@ -249,7 +249,7 @@ def first_targets(job: Job, outcome: JobOutcome) -> dict[str, Any]:
 
 
 # The solvers that take turns, by their numbers, in the worker's process.
-_asks: dict[int, Ask] = {}
+_factories: dict[int, SolveFactory] = {}
 
 
 class Turn(NamedTuple):
@@ -260,24 +260,24 @@ class Turn(NamedTuple):
     job: Job
     target_count: int
     is_first: bool  # whether the solver is set up anew
-    entrant: str = ""  # whose trouble was announced with the answers
+    user_solver: str = ""  # whose trouble was announced with the answers
 
     def perform(self) -> Iterator[Message]:
         """Yield the pace before the turn, and the answers."""
         return messages_of(self)
 
-    def set_up(self, adapter: Any) -> tuple[Ask, Ready]:
+    def set_up(self, adapter: Any) -> tuple[SolveFactory, Ready]:
         """Return the solver, as set up in its first turn."""
-        if self.is_first or self.number not in _asks:
-            _asks[self.number] = self.job.prepared(adapter)
-        return _asks[self.number], Ready(pace=clock.pace())
+        if self.is_first or self.number not in _factories:
+            _factories[self.number] = self.job.prepared(adapter)
+        return _factories[self.number], Ready(pace=clock.pace())
 
-    def answers(self, ask: Ask) -> Iterator[Solved]:
+    def answers(self, make_solve: SolveFactory) -> Iterator[Solved]:
         """Solve the targets, all converted before the first is solved.
 
         The first target is solved once before: caches are then as in a loop of solves.
         """
-        solves = [self.job.solve(ask, i) for i in range(self.target_count)]
+        solves = [self.job.solve(make_solve, i) for i in range(self.target_count)]
         solves[0]()
         unsent: list[Solved] = []
         for solve in solves:

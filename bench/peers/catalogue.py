@@ -16,7 +16,7 @@ from plumbob.reference import IK_SOLVERS, STEP_SOLVERS
 
 from . import cloth, ik
 from .peer import EXPLICIT, ITERATED, LINEARISED, ONE_START, RESTARTS, UNDECLARED, Peer, Run
-from .user_solver import CHAIN_TASK, ROBOT_TASK, Entrant
+from .user_solver import CHAIN_TASK, ROBOT_TASK, UserSolver
 
 PLUMBOB, PINOCCHIO, MUJOCO, NEWTON = "Plumbob", "Pinocchio", "MuJoCo", "Newton engine"
 
@@ -134,42 +134,42 @@ _RESTART_COUNT = 20
 _EXPLICIT_METHODS = ("explicit", "symplectic")
 
 
-def robot_peers(entrants: Iterable[Entrant] = ()) -> list[Peer]:
+def robot_peers(solvers: Iterable[UserSolver] = ()) -> list[Peer]:
     """Return the solvers for robots: `PEERS`, then the user's for robots."""
     restarts = Run(RESTARTS, {}, f"{_RESTART_COUNT} restarts", _RESTART_COUNT)
-    takers = [entrant for entrant in entrants if ROBOT_TASK in entrant.tasks]
-    users = (_user(entrant, "robot", (Run(ONE_START), restarts)) for entrant in takers)
+    takers = [solver for solver in solvers if ROBOT_TASK in solver.tasks]
+    users = (_user(solver, "robot", (Run(ONE_START), restarts)) for solver in takers)
     return [*PEERS, *users]
 
 
-def chain_peers(entrants: Iterable[Entrant]) -> list[Peer]:
+def chain_peers(solvers: Iterable[UserSolver]) -> list[Peer]:
     """Return the methods of the user's solvers for chains of balls."""
     return [
-        _user(entrant, "chain", (Run("", {"method": method}),), title)
-        for entrant in entrants
-        if CHAIN_TASK in entrant.tasks
-        for method, title in entrant.titles.items()
+        _user(solver, "chain", (Run("", {"method": method}),), title)
+        for solver in solvers
+        if CHAIN_TASK in solver.tasks
+        for method, title in solver.titles.items()
     ]
 
 
-def cloth_peers(entrants: Iterable[Entrant] = ()) -> tuple[Peer, ...]:
+def cloth_peers(solvers: Iterable[UserSolver] = ()) -> tuple[Peer, ...]:
     """Return a peer for each run on cloths: of the reference's solvers, engines, the user's."""
     reference, *engines = CLOTH_PEERS
     steps = (solver.run for solver in step_solvers().values())
     reference = replace(reference, runs=(*steps, *reference.runs))
     rows = (row for peer in (reference, *engines) for row in peer.rows)
-    return (*rows, *(_cloth_user(entrant) for entrant in entrants if entrant.offers("cloth")))
+    return (*rows, *(_cloth_user(solver) for solver in solvers if solver.offers("cloth")))
 
 
-def _cloth_user(entrant: Entrant) -> Peer:
+def _cloth_user(solver: UserSolver) -> Peer:
     """Return a user's solver as a peer for cloths, tried as its declared step requires."""
-    kind = EXPLICIT if entrant.step in _EXPLICIT_METHODS else LINEARISED
-    return _user(entrant, "cloth", (Run(kind if entrant.step else UNDECLARED),))
+    kind = EXPLICIT if solver.step in _EXPLICIT_METHODS else LINEARISED
+    return _user(solver, "cloth", (Run(kind if solver.step else UNDECLARED),))
 
 
-def _user(entrant: Entrant, problem: str, runs: tuple[Run, ...], title: str = "") -> Peer:
-    title, module = title or entrant.name, f"{__package__}.user_{problem}"
-    return Peer(title, module, "", "", "", "", runs, engine=entrant.name, entrant=entrant)
+def _user(solver: UserSolver, problem: str, runs: tuple[Run, ...], title: str = "") -> Peer:
+    title, module = title or solver.name, f"{__package__}.user_{problem}"
+    return Peer(title, module, "", "", "", "", runs, engine=solver.name, user_solver=solver)
 
 
 def ik_solvers() -> dict[str, Solver]:

@@ -27,14 +27,14 @@ def prepare(
     if engine:
         return _loop(skeleton, tolerance, engine)
 
-    def ask(request: ChainRequest) -> Solve:
+    def make_solve(request: ChainRequest) -> Solve:
         target, start, iterations = request
         options: dict[str, Any] = {"tolerance": tolerance, "max_iterations": iterations}
 
         call = partial(solve_ik, skeleton, start, target, solver, **options)
         return Solve(call, lambda s: (np.append(s.iterations, s.positions), None))
 
-    return ask
+    return make_solve
 
 
 def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainRequest], Solve]:
@@ -42,7 +42,7 @@ def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainReq
     arbiter = SKELETON_ENGINES[arbiter_of(name)](skeleton)
     effector, root = skeleton.joint_count - 1, skeleton.offsets[0]
 
-    def ask(request: ChainRequest) -> Solve:
+    def make_solve(request: ChainRequest) -> Solve:
         target = within_reach(request.target, root, skeleton.reach())
         q = coordinates(engine, request.start)
         limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": request.iterations}
@@ -54,4 +54,4 @@ def _loop(skeleton: Skeleton, tolerance: float, name: str) -> Callable[[ChainReq
         call = partial(levenberg_marquardt, engine, q, target, effector, **limits)
         return Solve(call, read)
 
-    return ask
+    return make_solve

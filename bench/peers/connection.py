@@ -20,29 +20,29 @@ _ABOUT = sentence("")
 ROUND_TRIPS = 'timed by the round trip of a request, for want of valid "seconds"'
 
 
-class EntrantSolver:
-    """A solver behind its door.
+class SolverConnection:
+    """An open solver.
 
     Attributes:
         remark: how its times are taken, where that is not by its own clock.
     """
 
     def __init__(self, spec: Spec) -> None:
-        self._door, self.remark = open_contestant(spec, LIMITS), ""
+        self._solver, self.remark = open_contestant(spec, LIMITS), ""
 
     @property
     def greeting(self) -> Greeting:
         """Its description of itself."""
-        return self._door.greeting
+        return self._solver.greeting
 
     def close(self) -> None:
         """End it."""
-        self._door.close()
+        self._solver.close()
 
     def answer(self, task: str, inputs: Mapping[str, Any]) -> tuple[Mapping[str, Any], OwnTime]:
         """Return its answer and its time, or raise NoAnswerError without an answer."""
         case = Case("of the bench", task, inputs, "bench", _ABOUT)
-        answer, round_trip = time_call(lambda: self._door.answer(case))
+        answer, round_trip = time_call(lambda: self._solver.answer(case))
         if isinstance(answer, Failure):
             raise NoAnswerError(str(answer.sentence))
         count, limit = answer.values.get("iterations", 0), inputs.get("max_iterations", 0)
@@ -56,16 +56,16 @@ class EntrantSolver:
         return answer.values, OwnTime(answer.seconds or round_trip, round_trip, doubt)
 
 
-_open: dict[Spec, EntrantSolver] = {}
+_connections: dict[Spec, SolverConnection] = {}
 
 
-def opened(spec: Spec) -> EntrantSolver:
+def connection(spec: Spec) -> SolverConnection:
     """Return an open solver; others stay open, for solvers take turns, and end with the process."""
-    solver = _open.pop(spec) if spec in _open else EntrantSolver(spec)
-    _open[spec] = solver
+    solver = _connections.pop(spec) if spec in _connections else SolverConnection(spec)
+    _connections[spec] = solver
     return solver
 
 
 def remark() -> str:
     """Return how the times of the last solver are taken, if not by its own clock."""
-    return list(_open.values())[-1].remark if _open else ""
+    return list(_connections.values())[-1].remark if _connections else ""

@@ -191,7 +191,7 @@ def meeting(
         errors = (counts * compute_error(configuration) for compute_error, counts in exact)
         return all(hypot(*e[:3]) <= tolerance and hypot(*e[3:]) <= tolerance for e in errors)
 
-    def ask(request: TaskRequest) -> Solve:
+    def make_solve(request: TaskRequest) -> Solve:
         configuration.update(request.goal)
         for part in parts:
             part.set_target_from_configuration(configuration)
@@ -199,4 +199,4 @@ def meeting(
             parts[-1].set_target(middle(robot))
         return Solve(partial(meet, request.start), lambda claim: (configuration.q.copy(), claim))
 
-    return ask
+    return make_solve

@@ -13,15 +13,15 @@ from plumbob.verify.greeting import Greeting
 from ..problems.own import clean
 from . import catalogue
 from .sources import commit_of, digest_of
-from .user_solver import SUITE_TASKS, Entrant, Spec
+from .user_solver import SUITE_TASKS, Spec, UserSolver
 
 GROUP = "plumbob.solvers"
 
 
 class SolverAddress(NamedTuple):
-    """A solver to open: its address, its spec, and the user's name for the solver."""
+    """A solver to open: the text of its address, its spec, and the user's name for the solver."""
 
-    door: str
+    text: str
     spec: Spec
     name: str = ""
     version: str = ""
@@ -39,15 +39,15 @@ def addresses(words: Sequence[str], program: Sequence[str] = ()) -> list[SolverA
 
 
 def _address(word: str) -> SolverAddress:
-    name, equals, door = word.partition("=")
+    name, equals, text = word.partition("=")
     if not equals or Path(word).exists():
-        name, door = "", word
-    if not door:
+        name, text = "", word
+    if not text:
         raise ValueError(f"with: expected NAME=FILE, got {word!r}")
-    place, colon, attribute = door.partition(":")
+    place, colon, attribute = text.partition(":")
     is_file = Path(place).exists()
-    spec = f"{Path(place).resolve()}{colon}{attribute}" if is_file else door
-    return SolverAddress(door, spec, name)
+    spec = f"{Path(place).resolve()}{colon}{attribute}" if is_file else text
+    return SolverAddress(text, spec, name)
 
 
 def installed() -> list[SolverAddress]:
@@ -63,65 +63,65 @@ def installed() -> list[SolverAddress]:
     ]
 
 
-def opened(addresses: Sequence[SolverAddress], suites: Sequence[str]) -> list[Entrant]:
+def open_solvers(addresses: Sequence[SolverAddress], suites: Sequence[str]) -> list[UserSolver]:
     """Return the solvers, each started once to describe itself.
 
     Raises:
         ValueError: if a solver cannot be opened, offers no task of the suites, or has the name of
             another.
     """
-    entrants = [_opened(address) for address in addresses]
-    for entrant in entrants:
-        if not any(map(entrant.offers, suites)):
+    solvers = [_open(address) for address in addresses]
+    for solver in solvers:
+        if not any(map(solver.offers, suites)):
             tasks = [f"{suite} ({', '.join(tasks)})" for suite, tasks in SUITE_TASKS.items()]
             raise ValueError(
-                f"with: expected a solver for one of the suites that are run; {entrant.door} "
-                f"offers {', '.join(entrant.tasks)}, and suites that ask entrants are "
+                f"with: expected a solver for one of the suites that are run; {solver.address} "
+                f"offers {', '.join(solver.tasks)}, and the suites for users' solvers are "
                 f"{' and '.join(tasks)}"
             )
-    doors: dict[str, str] = {}
-    for entrant in entrants:
-        first = doors.setdefault(entrant.name.casefold(), entrant.door)
-        if first is not entrant.door:
+    addresses_by_name: dict[str, str] = {}
+    for solver in solvers:
+        first = addresses_by_name.setdefault(solver.name.casefold(), solver.address)
+        if first is not solver.address:
             raise ValueError(
-                f"with: expected solvers of different names, got {entrant.name!r} twice, {first} "
-                f"and {entrant.door}; call one otherwise: --with 'another name={entrant.door}'"
+                f"with: expected solvers of different names, got {solver.name!r} twice, {first} "
+                f"and {solver.address}; call one otherwise: --with 'another name={solver.address}'"
             )
-    return entrants
+    return solvers
 
 
-def opened_where_possible(
-    installed: Sequence[SolverAddress], suites: Sequence[str], entrants: Sequence[Entrant]
-) -> Iterator[Entrant | str]:
+def open_installed(
+    installed: Sequence[SolverAddress], suites: Sequence[str], solvers: Sequence[UserSolver]
+) -> Iterator[UserSolver | str]:
     """Yield each installed solver with a task of the suites, or why the solver takes no part."""
-    names = {entrant.name.casefold() for entrant in entrants}
+    names = {solver.name.casefold() for solver in solvers}
     for address in installed:
         try:
-            entrant = _opened(address)
-            if not any(map(entrant.offers, suites)):
+            solver = _open(address)
+            if not any(map(solver.offers, suites)):
                 continue
-            if entrant.name.casefold() in names:
-                raise ValueError(f"there is a solver called {entrant.name!r} already")
-            names.add(entrant.name.casefold())
-            yield entrant
+            if solver.name.casefold() in names:
+                raise ValueError(f"there is a solver called {solver.name!r} already")
+            names.add(solver.name.casefold())
+            yield solver
         except ValueError as error:
-            yield f"{address.door} takes no part: {error}"
+            yield f"{address.text} takes no part: {error}"
 
 
-def _opened(address: SolverAddress) -> Entrant:
+def _open(address: SolverAddress) -> UserSolver:
     contestant = open_contestant(address.spec, LIMITS)
     try:
         greeting = contestant.greeting
     except NoGreetingError as error:
         why = one_line(str(error.failure.sentence), 300)
         raise ValueError(
-            f"with: expected a solver that says what it is, got {address.door}: {why}"
+            f"with: expected a solver that says what it is, got {address.text}: {why}"
         ) from None
     finally:
         contestant.close()
-    return Entrant(
+    return UserSolver(
         _name(address, greeting),
-        clean(address.door),
+        clean(address.text),
         address.spec,
         clean(greeting.version or address.version),
         commit_of(address.spec),
@@ -134,10 +134,10 @@ def _opened(address: SolverAddress) -> Entrant:
 
 def _name(address: SolverAddress, greeting: Greeting) -> str:
     """Return a name that no other solver has, with the address appended where needed."""
-    own_name, door = greeting.name, clean(address.door)
+    own_name, text = greeting.name, clean(address.text)
     if own_name == Greeting(greeting.protocol, ()).name:  # it has none
         word = address.spec if isinstance(address.spec, str) else address.spec[0]
         own_name = Path(word.partition(":")[0]).name
-    name = clean(address.name or own_name) or door
+    name = clean(address.name or own_name) or text
     taken_names = set(map(str.casefold, catalogue.names()))
-    return f"{name} ({door})" if name.casefold() in taken_names else name
+    return f"{name} ({text})" if name.casefold() in taken_names else name

@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
 from .packages import distribution_of
-from .user_solver import Entrant
+from .user_solver import UserSolver
 
 # A single attempt, a portfolio of several, and restarts from random poses until the solver succeeds
 # answer different questions.
@@ -78,7 +78,7 @@ class Peer:
     precision: str = ""  # the precision of its kinematics, if not double
     is_loop: bool = False  # whether it is a Python loop of ours on the package's kinematics
     environment: str = ""  # an environment of its own with its own Python; "" for a solver in ours
-    entrant: Entrant | None = None  # the user's solver, if any, which is always there
+    user_solver: UserSolver | None = None  # the user's solver, if any, which is always there
 
     @property
     def name(self) -> str:
@@ -113,21 +113,21 @@ class Peer:
     @property
     def version(self) -> str:
         """The installed version, "" if there is none; a user's solver states its own."""
-        if self.entrant:
-            return self.entrant.version
+        if self.user_solver:
+            return self.user_solver.version
         return self.distribution.version if self.distribution else ""
 
     @property
     def is_installed(self) -> bool:
         """Whether the peer can be used."""
-        return bool(self.entrant or self.version)
+        return bool(self.user_solver or self.version)
 
     @property
     def spec(self) -> dict[str, Any]:
         """Settings of the adapter to open a user's solver."""
-        return {"spec": self.entrant.spec} if self.entrant else {}
+        return {"spec": self.user_solver.spec} if self.user_solver else {}
 
     @property
-    def entrant_name(self) -> str:
+    def user_solver_name(self) -> str:
         """The name of the user's solver, "" of others."""
-        return self.entrant.name if self.entrant else ""
+        return self.user_solver.name if self.user_solver else ""

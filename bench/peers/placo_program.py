@@ -2,7 +2,7 @@
 
 Its input and output are lines of JSON. The first is {"text": a URDF, "effector", "joints", "parts",
 "iterations", "limits": [m] and [rad], "regularization", "weight", "is_metered"} and is answered by
-true. A question is {"target": a transform, "start"} or, where a goal gives the targets of the
+true. A request is {"target": a transform, "start"} or, where a goal gives the targets of the
 parts, {"goal": coordinates, "start"}. The answer is whether the target is reached, the time [s],
 the coordinates, and the time of PlaCo's own functions [s], 0 unless metered.
 """
@@ -55,12 +55,12 @@ class PlacoArm:
         self._setters = [kinds[part["kind"]](part) for part in task["parts"]]
         self._solver.add_regularization_task(task["regularization"])
 
-    def aim(self, question: dict[str, Any]) -> None:
-        """Set the targets of a question."""
-        if "goal" in question:
-            self._place(question["goal"])
+    def aim(self, request: dict[str, Any]) -> None:
+        """Set the targets of a request."""
+        if "goal" in request:
+            self._place(request["goal"])
         for set_target in self._setters:
-            set_target(question)
+            set_target(request)
 
     def solve(self, start: Sequence[float]) -> tuple[bool, np.ndarray]:
         """Return whether the target is reached, and the coordinates."""
@@ -96,7 +96,7 @@ class PlacoArm:
         distance, angle = self._task["limits"]
         self._add(frame.position(), distance)
         self._add(frame.orientation(), angle, self._task["weight"])
-        return lambda question: setattr(frame, "T_world_frame", np.array(question["target"]))
+        return lambda request: setattr(frame, "T_world_frame", np.array(request["target"]))
 
     def _frame(self, part: dict[str, Any]) -> Callable[[dict[str, Any]], None]:
         frames, limit = (part["base"], self._task["effector"]), self._task["limits"][0]
@@ -149,10 +149,10 @@ def main() -> None:
     arm = PlacoArm(json.loads(sys.stdin.readline()))
     print("true", file=answers, flush=True)
     for line in sys.stdin:
-        question = json.loads(line)
-        arm.aim(question)
+        request = json.loads(line)
+        arm.aim(request)
         before, arm.library_seconds = process_time(), 0.0
-        claim, q = arm.solve(question["start"])
+        claim, q = arm.solve(request["start"])
         seconds = process_time() - before
         print(json.dumps([bool(claim), seconds, q.tolist(), arm.library_seconds]),
               file=answers, flush=True)  # fmt: skip

@@ -1,13 +1,13 @@
 """The interface of adapters, for robots and for cloths.
 
 An adapter for robots is a module with a function `prepare(robot, tolerance, **settings)`. `prepare`
-sets the engine up for a robot and returns a function `ask(request)`. `ask` puts a target in the
-engine's own types and returns a `Solve`. Only the solver's own calls are timed: neither conversions
-nor set-up count. For an unsuitable robot `prepare` raises `UnableError`. An adapter with a loop
-around its solver passes the solver's functions through `clock.library`. If the engine's
-kinematics is compared as well, its adapter has a function `kinematics(robot)`, which returns a
-`Forward`. A function `prepare_all(robot)` lists all solutions of a pose, and `prepare_task` takes
-tasks beyond poses.
+sets the engine up for a robot and returns a function `make_solve(request)`. `make_solve` puts a
+target in the engine's own types and returns a `Solve`. Only the solver's own calls are timed:
+neither conversions nor set-up count. For an unsuitable robot `prepare` raises `UnableError`. An
+adapter with a loop around its solver passes the solver's functions through `clock.library`. If the
+engine's kinematics is compared as well, its adapter has a function `kinematics(robot)`, which
+returns a `Forward`. A function `prepare_all(robot)` lists all solutions of a pose, and
+`prepare_task` takes tasks beyond poses.
 
 An adapter for cloths has a function `prepare(system, frame, **settings)`. `prepare` sets the engine
 up for particles and springs and returns a `Mover`, to move the particles a frame at a time. Only
@@ -84,7 +84,7 @@ class Solve:
         return SolverOutput(*self.read(answer), OwnTime(seconds))
 
 
-Ask = Callable[[PoseRequest], Callable[[], SolverOutput]]
+SolveFactory = Callable[[PoseRequest], Callable[[], SolverOutput]]
 # From coordinates to the transforms of the effectors, (effector, 4, 4), or of the only effector,
 # (4, 4).
 Forward = Callable[[FloatArray], FloatArray]

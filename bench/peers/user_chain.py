@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 
 from ..problems.chains import ChainRequest
 from ..problems.evaluate import arbiter_of
-from .connection import opened
+from .connection import connection
 from .protocol import SolverOutput
 from .user_solver import CHAIN_TASK, Spec
 
@@ -29,7 +29,7 @@ def prepare(
     Raises:
         NoAnswerError: if there is no answer with an iteration allowed.
     """
-    solver, arbiter = opened(spec), SKELETON_ENGINES[arbiter_of("")](skeleton)
+    solver, arbiter = connection(spec), SKELETON_ENGINES[arbiter_of("")](skeleton)
     constants = {"parents": skeleton.parents, "offsets": skeleton.offsets, "tolerance": tolerance}
     constants |= {"effector": skeleton.joint_count - 1, "method": method}
 
@@ -37,7 +37,7 @@ def prepare(
         variables = {"local_rotations": start, "target": target, "max_iterations": iterations}
         return {**constants, **variables}
 
-    def ask(request: ChainRequest) -> Callable[[], SolverOutput]:
+    def make_solve(request: ChainRequest) -> Callable[[], SolverOutput]:
         def solve() -> SolverOutput:
             answer, time = solver.answer(CHAIN_TASK, inputs(*request))
             positions = joint_positions(skeleton, answer, arbiter)
@@ -49,7 +49,7 @@ def prepare(
     rest = np.tile([1.0, 0.0, 0.0, 0.0], (skeleton.joint_count, 1))
     effector = forward_kinematics(skeleton, rest).positions[-1]
     solver.answer(CHAIN_TASK, inputs(0.5 * (skeleton.offsets[0] + effector), rest, 1))
-    return ask
+    return make_solve
 
 
 def joint_positions(

@@ -6,7 +6,7 @@ from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.verify.greeting import Greeting
 
-from .connection import opened
+from .connection import connection
 from .protocol import Mover, OwnTime, total
 from .user_solver import MOTION_TASK, STEP_TASK, Spec
 
@@ -26,7 +26,7 @@ class _Requests:
     """Steps, each a request; the first non-finite step is the last."""
 
     def __init__(self, system: MassSpring, h: float, substeps: int, spec: Spec) -> None:
-        self._solver, self._h, self._substeps = opened(spec), h, substeps
+        self._solver, self._h, self._substeps = connection(spec), h, substeps
         greeting = self._solver.greeting
         _check_model(system, greeting)
         self._task = STEP_TASK if STEP_TASK in greeting.tasks else MOTION_TASK

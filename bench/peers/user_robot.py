@@ -9,12 +9,12 @@ from plumbob.reference import rotation
 from plumbob.verify.kinematics import robot_models
 
 from ..problems.robots import links
-from .connection import opened
+from .connection import connection
 from .protocol import (
-    Ask,
     BenchRobot,
     NoAnswerError,
     PoseRequest,
+    SolveFactory,
     SolverOutput,
     Tolerance,
     UnableError,
@@ -24,7 +24,7 @@ from .user_solver import ROBOT_TASK, Spec
 ITERATIONS = 200
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> SolveFactory:
     """Return a user's solver, set up for a robot.
 
     Raises:
@@ -32,10 +32,10 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> Ask:
     """
     if not robot.is_chain:
         raise UnableError("not asked: the protocol has hinges and one effector, no balls")
-    solver, inputs = opened(spec), robot_inputs(robot)
+    solver, inputs = connection(spec), robot_inputs(robot)
     inputs |= {"tolerance": tolerance.position, "tolerance_rotation": tolerance.rotation}
 
-    def ask(request: PoseRequest) -> Callable[[], SolverOutput]:
+    def make_solve(request: PoseRequest) -> Callable[[], SolverOutput]:
         target = {"target_position": request.positions[0], "start": request.start}
         target["target_rotation"] = rotation.from_matrix(request.rotations[0])
 
@@ -47,7 +47,7 @@ def prepare(robot: BenchRobot, tolerance: Tolerance, spec: Spec = "") -> Ask:
 
         return solve
 
-    return ask
+    return make_solve
 
 
 def robot_inputs(robot: BenchRobot) -> dict[str, Any]:

@@ -7,16 +7,16 @@ Spec = str | tuple[str, ...]
 
 CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"
 STEP_TASK, MOTION_TASK = "mass_spring_step", "mass_spring_motion"
-# The tasks of each suite for an entrant.
+# The tasks of each suite for a user's solver.
 SUITE_TASKS = {"ik": (CHAIN_TASK, ROBOT_TASK), "cloth": (STEP_TASK, MOTION_TASK)}
 
 
 @dataclass(frozen=True)
-class Entrant:
+class UserSolver:
     """A solver, opened once to describe itself."""
 
     name: str  # its own, or the user's name for it
-    door: str  # its address as the user gave it
+    address: str  # its address as the user gave it
     spec: Spec  # the argument that opens it
     version: str = ""  # its own; "" if it states none
     commit: str = ""  # of its sources, and whether they were changed since; "" outside of git

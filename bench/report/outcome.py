@@ -9,7 +9,7 @@ from ..peers.packages import peers_command
 from ..tables.aligned import filled
 from ..tables.results import Results, counted, grouped
 from ..tables.table import is_blank, words
-from ..tables.user_solvers import remarks_of_entrants
+from ..tables.user_solvers import solver_remarks
 from .headlines import ClaimCount, Overview, overview
 from .report import BenchReport
 from .sections import tables
@@ -42,7 +42,7 @@ def ending(results: Results, suites: Sequence[str], width: int) -> list[str]:
     sentences = [*map(_standing, answers.standings)]
     sentences += [_verdict(answers.verdict)] if "check" in suites else []
     sentences += leading(answers)
-    sentences += remarks_of_entrants(results, suites)
+    sentences += solver_remarks(results, suites)
     if not sentences:
         full = [table for table in tables(results, suites) if not is_blank(table)]
         gists = {table.title: table.summary.sentence for table in full[:TABLES]}

@@ -65,7 +65,7 @@ def _target_ranks(
 ) -> Iterator[Headline]:
     """Yield the ranks of solvers among the solvers that finished the same targets."""
     entries = [score for field in fields.values() for score in field]
-    for solver in dict.fromkeys(s.solver for s in entries if s.records[0].is_entrant):
+    for solver in dict.fromkeys(s.solver for s in entries if s.records[0].is_user_solver):
         problems = {score.robots for score in entries if score.solver == solver}
         equal_fields = {r: scores.on_targets_of(solver, field) for r, field in fields.items()}
         rows = {row.solver: row for row in scores.together(problems, equal_fields)}
@@ -140,7 +140,7 @@ def speed(ratio: metrics.Interval, rival: str) -> str:
 
 def _cloth_ranks(task: str, field: Sequence[Point]) -> Iterator[Headline]:
     """Yield the ranks of solvers by their errors, cloth by cloth."""
-    for solver in dict.fromkeys(p.solver for p in field if p.record.is_entrant):
+    for solver in dict.fromkeys(p.solver for p in field if p.record.is_user_solver):
         cloths = dict.fromkeys(point.cloth for point in field if point.solver == solver)
         by_cloth = [[point for point in field if point.cloth == cloth] for cloth in cloths]
         ranks, details = zip(*(_cloth_rank(points, solver) for points in by_cloth), strict=True)

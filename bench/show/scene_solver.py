@@ -1,4 +1,4 @@
-"""Ask a user's solver for the motion of a scene, by the same doors as `plumbob verify`."""
+"""Motion of a scene by a user's solver, opened as by `plumbob verify`."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Self
@@ -24,7 +24,7 @@ H = 1 / 60
 Progress = Callable[[int, int], None]
 
 
-class YourSolver:
+class SceneSolver:
     """A solver judged by its answers, open until `close`.
 
     Attributes:
@@ -33,15 +33,15 @@ class YourSolver:
         tasks: as offered.
     """
 
-    def __init__(self, address: str, contestant: Contestant) -> None:
+    def __init__(self, address: str, solver: Contestant) -> None:
         """Ask a solver for its name and tasks.
 
         Raises:
             ValueError: if it does not describe itself.
         """
-        self.address, self._contestant = address, contestant
+        self.address, self._solver = address, solver
         try:
-            self._greeting = self._contestant.greeting
+            self._greeting = self._solver.greeting
         except NoGreetingError as error:
             self.close()
             reason = one_line(str(error.failure.sentence), 500)
@@ -60,7 +60,7 @@ class YourSolver:
 
     def close(self) -> None:
         """End the solver and its processes."""
-        self._contestant.close()
+        self._solver.close()
 
     @property
     def scene(self) -> str:
@@ -150,7 +150,7 @@ class YourSolver:
 
     def _answer(self, task: str, inputs: dict[str, Any], request: str) -> dict[str, Any]:
         """Return the answer to a request, which error messages name."""
-        answer = self._contestant.answer(Case(request, task, inputs, "show", sentence("")))
+        answer = self._solver.answer(Case(request, task, inputs, "show", sentence("")))
         if isinstance(answer, Failure):
             reason = one_line(str(answer.sentence), 300)
             raise ValueError(

@@ -15,7 +15,7 @@ from ..motion import motion
 from ..motion.motion import Moving, Scene
 from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..tables.results import label
-from .scene_solver import ARM_TASKS, CLOTH_TASKS, H, YourSolver
+from .scene_solver import ARM_TASKS, CLOTH_TASKS, H, SceneSolver
 
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *reference.curves)
@@ -54,7 +54,7 @@ def write(
     path: Path,
     solver: str | None,
     progress: Progress,
-    competitor: YourSolver | None = None,
+    user_solver: SceneSolver | None = None,
 ) -> None:
     """Write a scene as a page, a picture or a BVH motion, by the suffix of the file.
 
@@ -63,17 +63,17 @@ def write(
         path: of the file.
         solver: of Plumbob; FABRIK or Newton's if None.
         progress: called with the frames done and their number.
-        competitor: a solver beside Plumbob's.
+        user_solver: a solver beside Plumbob's.
 
     Raises:
         ValueError: if scene or solver are unknown, the suffix does not fit them, or the
             user's solver does not answer.
     """
     is_cloth = choice("scene", name, SCENES) == CLOTH
-    bones = () if is_cloth or competitor else (BVH,)
+    bones = () if is_cloth or user_solver else (BVH,)
     choice("suffix of the file", path.suffix, (HTML, SVG, *bones))
-    if competitor:
-        competitor.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
+    if user_solver:
+        user_solver.offered(*(("a cloth", CLOTH_TASKS) if is_cloth else ("an arm", ARM_TASKS)))
     solver = choice(
         "solver",
         solver or _DEFAULTS[is_cloth],
@@ -81,13 +81,13 @@ def write(
     )
     if is_cloth:
         cloth = cloth_motion(solver)
-        moves = [(c.name, step_like(cloth, c, progress)) for c in [competitor] if c]
+        moves = [(c.name, step_like(cloth, c, progress)) for c in [user_solver] if c]
         return _write_scene(cloth_scene(cloth, solver, moves), path, progress)
     arm = arm_motion(name, solver)
     if path.suffix == BVH:
         seconds = SECONDS / len(arm.curve)
         return bvh.write(path, arm.skeleton, arm.motion.local_rotations, seconds)
-    moves = [(c.name, draw_like(arm, c, progress)) for c in [competitor] if c]
+    moves = [(c.name, draw_like(arm, c, progress)) for c in [user_solver] if c]
     return _write_scene(arm_scene(name, arm, f"Plumbob {label(solver)}", moves), path, progress)
 
 
@@ -108,19 +108,19 @@ def arm_motion(name: str, solver: str) -> ArmMotion:
     return ArmMotion(skeleton, rest, even, reference.track(skeleton, even, solver, rest))
 
 
-def draw_like(arm: ArmMotion, solver: YourSolver, progress: Progress) -> FloatArray:
+def draw_like(arm: ArmMotion, solver: SceneSolver, progress: Progress) -> FloatArray:
     """Return the joint positions of a solver that draws the arm's curve, (frame, joint, 3)."""
     return solver.follow_curve(arm.skeleton, arm.rest, arm.curve, progress)
 
 
 def arm_scene(
-    name: str, arm: ArmMotion, solver: str, competitors: Sequence[tuple[str, FloatArray]] = ()
+    name: str, arm: ArmMotion, solver: str, other_solvers: Sequence[tuple[str, FloatArray]] = ()
 ) -> Scene:
-    """Return the scene of an arm, behind the names and joint positions of competitors."""
+    """Return the scene of an arm, behind the names and joint positions of other solvers."""
     points = arm.curve
     frames = np.linspace(0, len(points) - 1, min(len(points), FRAMES)).round().astype(int)
     motions = []
-    for title, x in [*competitors, (solver, arm.motion.positions)]:
+    for title, x in [*other_solvers, (solver, arm.motion.positions)]:
         errors = np.linalg.norm(x[frames, -1] - points[frames], axis=-1)
         motions.append(Moving(title, x[frames], errors))
     curve = "the custom curve" if name == ARM else f"the curve “{name.replace('_', ' ')}”"
@@ -148,18 +148,18 @@ def cloth_motion(solver: str, mass: float = 1.0) -> ClothMotion:
     return ClothMotion(system, start, np.array(positions))
 
 
-def step_like(cloth: ClothMotion, solver: YourSolver, progress: Progress) -> FloatArray:
+def step_like(cloth: ClothMotion, solver: SceneSolver, progress: Progress) -> FloatArray:
     """Return the positions of a cloth after each step of a solver, (frame, particle, 3)."""
     return solver.step_cloth(cloth.system, cloth.start, len(cloth.positions) - 1, progress)
 
 
 def cloth_scene(
-    cloth: ClothMotion, solver: str, competitors: Sequence[tuple[str, FloatArray]] = ()
+    cloth: ClothMotion, solver: str, other_solvers: Sequence[tuple[str, FloatArray]] = ()
 ) -> Scene:
     """Return the scene of a cloth, with distances to the exact implicit motion."""
     exact = cloth.positions if solver == EXACT else cloth_motion(EXACT).positions
     motions = []
-    for title, x in [*competitors, (f"Plumbob {label(solver)}", cloth.positions)]:
+    for title, x in [*other_solvers, (f"Plumbob {label(solver)}", cloth.positions)]:
         distances = np.linalg.norm(x[::EVERY] - exact[::EVERY], axis=-1)
         rms = np.sqrt(np.mean(distances**2, axis=-1))
         motions.append(Moving(title, x[::EVERY], rms, distances))

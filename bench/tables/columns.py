@@ -70,7 +70,7 @@ def reported_iterations(record: Record) -> metrics.Floats:
 def spread_of_iterations(record: Record) -> Sequence[Cell]:
     """Return median, 95th percentile and maximum of the iterations, None without any count.
 
-    The counts of an entrant are its own claim, and marked so.
+    The counts of a user's solver are its own claim, and marked so.
     """
     counts = reported_iterations(record)
     if not counts.size:

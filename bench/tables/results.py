@@ -48,7 +48,7 @@ class Results:
         return product
 
     @property
-    def entrants(self) -> frozenset[str]:
+    def user_solvers(self) -> frozenset[str]:
         """The solvers entered by a user."""
         return frozenset(r.solver for r in self.records if r.measured.get("entrant") is True)
 

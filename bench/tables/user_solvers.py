@@ -10,8 +10,8 @@ from .results import Results, grouped, listed
 from .table import Column, Summary
 
 NOT_ASKED = "not asked"
-# The records of an entrant in a suite.
-EntrantRecords = Sequence[Record]
+# The records of a user's solver in a suite.
+SolverRecords = Sequence[Record]
 
 
 def _why_not_asked(record: Record) -> str:
@@ -19,51 +19,51 @@ def _why_not_asked(record: Record) -> str:
     return remark if remark.startswith(NOT_ASKED) else ""
 
 
-def remarks_of_entrants(results: Results, suites: Iterable[str]) -> list[str]:
-    """Return a sentence on each entrant of some suites not asked for every task."""
+def solver_remarks(results: Results, suites: Iterable[str]) -> list[str]:
+    """Return a sentence on each user's solver of some suites not asked for every task."""
     records = [record for suite in suites for record in results.all(suite, entrant=True)]
     remarks = (f"{r.solver} was {why}." for r in records if (why := _why_not_asked(r)))
     return list(dict.fromkeys(remarks))
 
 
-def _entrants(results: Results) -> list[EntrantRecords]:
+def _user_solvers(results: Results) -> list[SolverRecords]:
     records = [*results.all("ik", entrant=True), *results.all("cloth", entrant=True)]
     return list(grouped(records, lambda record: (record.suite, record.solver)).values())
 
 
-def _version(records: EntrantRecords) -> str:
+def _version(records: SolverRecords) -> str:
     return str(records[-1].settings.get("version") or "–")
 
 
-def _commit(records: EntrantRecords) -> str:
+def _commit(records: SolverRecords) -> str:
     """Return the commit of the solver's own sources, with a plus if changed."""
     conditions = {"commit": records[-1].conditions.get("solver_commit", "")}
     return replace(records[-1], conditions=conditions).commit or "–"
 
 
-def _remark(records: EntrantRecords) -> str:
+def _remark(records: SolverRecords) -> str:
     """Return why a solver was not asked for every task, and its errors."""
     remarks = (_why_not_asked(record) or record.trouble for record in records)
     return "; ".join(dict.fromkeys(filter(None, remarks)))
 
 
-def _summary(entrants: Sequence[EntrantRecords]) -> Summary:
-    names = [f"{records[-1].solver} ({_version(records)})" for records in entrants]
+def _summary(user_solvers: Sequence[SolverRecords]) -> Summary:
+    names = [f"{records[-1].solver} ({_version(records)})" for records in user_solvers]
     return Summary(f"{listed(names)}.")
 
 
-entrant_table = Layout(
+user_solver_table = Layout(
     "Which solvers of yours take part?",
     "entered",
     "Your solvers",
-    subjects=_entrants,
+    subjects=_user_solvers,
     columns=(
         text("solver", lambda records: records[-1].solver),
         text("suite", lambda records: records[-1].suite),
         text("version", _version),
         text("commit", _commit),
         text("sources", lambda records: str(records[-1].measured.get("digest") or "–")),
-        text("door", lambda records: str(records[-1].measured.get("door") or "–")),
+        text("address", lambda records: str(records[-1].measured.get("door") or "–")),
         Column("records", read=len),
         text("remark", _remark),
     ),

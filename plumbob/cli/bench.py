@@ -22,11 +22,11 @@ from .options import (
     FAILED,
     REPORT,
     SUCCESS,
-    Entrants,
     Fresh,
     Output,
     Text,
     Texts,
+    UserSolvers,
     argument,
     flag,
     option,
@@ -73,7 +73,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     output: Output = REPORT,
     fresh: Fresh = False,
     quick: Quick = False,
-    entrants: Entrants = None,
+    user_solvers: UserSolvers = None,
     solver: Solvers = None,
     problem: Problems = None,
     robot: Robots = None,
@@ -96,7 +96,7 @@ def bench(  # noqa: PLR0913 -- one parameter an option
     names = list(dict.fromkeys(valid_name("suite", name, SUITES) for name in suites or SUITES))
     parts = (solver or (), problem or (), robot or ())
     request = MeasurementRequest(
-        entrants or (), program_of(context), *parts, targets, seed, seeds, effector
+        user_solvers or (), program_of(context), *parts, targets, seed, seeds, effector
     )
     choice = choose(names, QUICK if quick else FULL, request)
     if listing or dry:

@@ -12,10 +12,10 @@ from .options import (
     FAILED,
     REPORT,
     SUCCESS,
-    Entrants,
     File,
     Text,
     Texts,
+    UserSolvers,
     argument,
     is_name,
     option,
@@ -52,7 +52,7 @@ def compare(  # noqa: PLR0913 -- one parameter an option
     *,
     fail: Limits = "",
     rerun: Revision = "",
-    entrants: Entrants = None,
+    user_solvers: UserSolvers = None,
     suites: Measured = None,
     only: Only = None,
     pairs: Pairs = 0,
@@ -73,9 +73,9 @@ def compare(  # noqa: PLR0913 -- one parameter an option
     paths = list(folders or [])
     if save is not None:
         return _save(save, paths)
-    limits = comparison.gate_limits(fail or comparison.OF_SOLVERS * bool(entrants))
+    limits = comparison.gate_limits(fail or comparison.OF_SOLVERS * bool(user_solvers))
     if rerun and not paths:
-        rows = _side_by_side(rerun, entrants or [], suites or [], only or [], pairs)
+        rows = _side_by_side(rerun, user_solvers or [], suites or [], only or [], pairs)
         old, new = rerun, "the working copy"
     elif len(paths) == 2 and not rerun:
         before, after = map(_records, paths)

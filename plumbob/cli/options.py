@@ -49,7 +49,7 @@ Texts = list[str] | None
 File = Path | None
 Text = str | None
 Output = Annotated[Path, option("DIR", "Folder of the records and report.", "--output", "-o")]
-Entrants = Annotated[
+UserSolvers = Annotated[
     Texts, option("SOLVER", "Your my_ik.py or module:object; repeatable.", "--with")
 ]
 Fresh = Annotated[bool, flag("Delete the records and measure again.", "--fresh")]

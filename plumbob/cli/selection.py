@@ -10,7 +10,7 @@ from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
 from plumbob.bench.harness.block import Block, Choice, Scale
 from plumbob.bench.peers import catalogue, opening
-from plumbob.bench.peers.user_solver import Entrant
+from plumbob.bench.peers.user_solver import UserSolver
 from plumbob.bench.problems import files
 from plumbob.bench.problems.own import OwnProblem
 from plumbob.bench.problems.robots import REACHABLE, UNREACHABLE
@@ -27,7 +27,7 @@ class MeasurementRequest(NamedTuple):
     """The options on solvers and problems.
 
     Attributes:
-        entrants: solvers of the user, as given to --with.
+        user_solvers: solvers of the user, as given to --with.
         program: of the user, behind --.
         solvers, problems, robots: by name; all if empty. Problems may be files.
         targets: random targets a problem, if not as in the scale.
@@ -36,7 +36,7 @@ class MeasurementRequest(NamedTuple):
         effector: link of the user's models that reaches the target.
     """
 
-    entrants: Sequence[str] = ()
+    user_solvers: Sequence[str] = ()
     program: Sequence[str] = ()
     solvers: Sequence[str] = ()
     problems: Sequence[str] = ()
@@ -53,23 +53,23 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
     Raises:
         ValueError: if a solver or problem cannot be opened, or a name is unknown.
     """
-    entries = opening.addresses(request.entrants, request.program)
-    entrants = opening.opened(entries, suites)
-    installed = opening.opened_where_possible(opening.installed(), suites, entrants)
-    for entrant in installed:
-        if isinstance(entrant, str):
-            print(f"plumbob: {visible(entrant)}", file=sys.stderr)
+    entries = opening.addresses(request.user_solvers, request.program)
+    user_solvers = opening.open_solvers(entries, suites)
+    installed = opening.open_installed(opening.installed(), suites, user_solvers)
+    for solver in installed:
+        if isinstance(solver, str):
+            print(f"plumbob: {visible(solver)}", file=sys.stderr)
         else:
-            entrants.append(entrant)
+            user_solvers.append(solver)
     own, names = files.read(request.problems, suites, request.effector)
-    size = _scale(scale, request, entrants, own)
+    size = _scale(scale, request, user_solvers, own)
     if not any((request.solvers, names, request.robots)):
         return Choice(scale, size, is_partial=request.targets is not None)
     every = [block for suite in suites for block in blocks(suite, size)]
     solvers = _recorded("solver", request.solvers, every, _solver_names)
     if solvers:  # the solvers of this command take part beside them
-        doors = {entry.door for entry in entries}
-        solvers += [block.solver for block in every if block.facts.get("door") in doors]
+        addresses = {entry.text for entry in entries}
+        solvers += [block.solver for block in every if block.facts.get("door") in addresses]
     problems = _recorded("problem", names, every, _problem_names)
     problems += _recorded("robot", request.robots, every, _robot_names)
     # Blocks of absent solvers are of the problem "robots/all".
@@ -86,7 +86,10 @@ def choose(suites: Sequence[str], scale: str, request: MeasurementRequest) -> Ch
 
 
 def _scale(
-    name: str, request: MeasurementRequest, entrants: list[Entrant], problems: list[OwnProblem]
+    name: str,
+    request: MeasurementRequest,
+    user_solvers: list[UserSolver],
+    problems: list[OwnProblem],
 ) -> Scale:
     """Return a scale with the user's solvers, problems, targets and seeds."""
     scale = SCALES[name]
@@ -95,7 +98,7 @@ def _scale(
         targets=request.targets or scale.targets,
         seed=scale.seed if request.seed is None else request.seed,
         seeds=request.seeds,
-        entrants=tuple(entrants),
+        user_solvers=tuple(user_solvers),
         problems=tuple(problems),
     )
 

@@ -12,7 +12,7 @@ from .terminal import progress
 from .verify import program_of
 
 if TYPE_CHECKING:
-    from plumbob.bench.show.scene_solver import YourSolver
+    from plumbob.bench.show.scene_solver import SceneSolver
 
 
 Scene = Annotated[Text, argument("SCENE", "arm, cloth, or a curve that the arm draws.")]
@@ -38,7 +38,7 @@ def show(
     Your solver moves beside Plumbob's, with errors in colour. The motion of the arm can also be
     written as BVH, which animation programs open.
     """
-    from plumbob.bench.show.scene_solver import YourSolver
+    from plumbob.bench.show.scene_solver import SceneSolver
     from plumbob.bench.show.scenes import SCENES
 
     program = program_of(context)
@@ -49,19 +49,19 @@ def show(
         raise ValueError(f"SCENE: expected one of {', '.join(SCENES)}, got none")
     if scene is not None:
         valid_name("scene", scene, SCENES)
-    entrant = YourSolver.open(words) if words else None
+    user_solver = SceneSolver.open(words) if words else None
     try:
-        name = scene or (entrant.scene if entrant else "")
+        name = scene or (user_solver.scene if user_solver else "")
         path = file or REPORT / f"{name}.html"
-        _draw(name, path, solver, entrant)
+        _draw(name, path, solver, user_solver)
     finally:
-        if entrant:
-            entrant.close()
+        if user_solver:
+            user_solver.close()
     print(visible(str(path)))
     return SUCCESS
 
 
-def _draw(name: str, path: Path, solver: str | None, entrant: "YourSolver | None") -> None:
+def _draw(name: str, path: Path, solver: str | None, user_solver: "SceneSolver | None") -> None:
     """Write a scene to a file with a progress bar."""
     from plumbob.bench.show.scenes import write
     from plumbob.process.paths import check_regular
@@ -74,4 +74,4 @@ def _draw(name: str, path: Path, solver: str | None, entrant: "YourSolver | None
         def update(frame: int, total: int) -> None:
             bar.update(task, completed=frame, total=total)
 
-        write(name, path, solver, update, entrant)
+        write(name, path, solver, update, user_solver)

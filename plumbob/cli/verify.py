@@ -155,12 +155,12 @@ def _judge(
     for path in filter(None, files.paths()):
         check_regular(path)
         writable(path.parent)
-    contestant = opened(list(context.solver), limits, say)
-    question = suited(question, contestant)
+    user_solver = opened(list(context.solver), limits, say)
+    question = suited(question, user_solver)
     notify, publish = _notifier(bar, say), _publisher(bar, files, question, context)
     try:
         notify(sentence("starting the solver"), 0, None)
-        report = ask(contestant, question, notify, publish)
+        report = ask(user_solver, question, notify, publish)
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: it did not start, or did not answer the greeting (the first request). {why}",

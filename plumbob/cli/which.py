@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from .bench import run_with_progress
-from .options import SUCCESS, Entrants, Text, argument, option, valid_name
+from .options import SUCCESS, Text, UserSolvers, argument, option, valid_name
 from .report import FORMATS, formatted
 from .terminal import print_filled, print_lines
 
@@ -20,7 +20,7 @@ SUFFIXES = (".urdf", ".xml", ".mjcf")
 def which(
     robot: Annotated[Path, argument("ROBOT", "Your robot: .urdf, or .xml or .mjcf of MuJoCo.")],
     *,
-    entrants: Entrants = None,
+    user_solvers: UserSolvers = None,
     link: Annotated[Text, option("NAME", "Link or body that must reach the targets.")] = None,
     form: Annotated[
         str, option("FORMAT", f"Print the table as {', '.join(FORMATS)}.", "--format")
@@ -37,7 +37,7 @@ def which(
 
     if form:
         valid_name("format", form, FORMATS)
-    choice = _choice(robot, link, entrants or ())
+    choice = _choice(robot, link, user_solvers or ())
     with tempfile.TemporaryDirectory(prefix="plumbob-which-") as folder:
         run_with_progress(["ik"], choice, Path(folder))
         table = solvers_on_robot(Results(on_record(Path(folder)).records), robot.name)
@@ -51,7 +51,7 @@ def which(
     return SUCCESS
 
 
-def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
+def _choice(robot: Path, link: str | None, user_solvers: Sequence[str]) -> "Choice":
     """Return each solver on poses that a robot can reach, ten in each of six strata.
 
     Raises:
@@ -72,8 +72,8 @@ def _choice(robot: Path, link: str | None, entrants: Sequence[str]) -> "Choice":
     except ValueError as error:
         hint = "" if link else "; --link names the link that must reach the targets"
         raise ValueError(str(error).replace("effector: ", "--link: ") + hint) from None
-    own_solvers = opening.opened(opening.addresses(entrants), ["ik"])
-    if chains_only := [e.door for e in own_solvers if ROBOT_TASK not in e.tasks]:
+    own_solvers = opening.open_solvers(opening.addresses(user_solvers), ["ik"])
+    if chains_only := [s.address for s in own_solvers if ROBOT_TASK not in s.tasks]:
         raise ValueError(f"with: expected a solver with {ROBOT_TASK}, got {chains_only[0]}")
-    scale = replace(SCALES["quick"], entrants=tuple(own_solvers), problems=tuple(own))
+    scale = replace(SCALES["quick"], user_solvers=tuple(own_solvers), problems=tuple(own))
     return Choice("quick", scale, problems=(poses,), is_partial=True)

@@ -22,7 +22,7 @@ from plumbob.bench.harness.machine import measuring_part, stamp
 from plumbob.bench.harness.measure import block_key
 from plumbob.bench.harness.record import Record, RecordFile, decode
 from plumbob.bench.peers.sources import digest_of
-from plumbob.bench.peers.user_solver import Entrant
+from plumbob.bench.peers.user_solver import UserSolver
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown
@@ -162,8 +162,8 @@ def test_a_worker_with_other_versions_or_sources_refuses(part):
 def test_a_users_solver_must_have_the_same_files_on_the_worker(tmp_path):
     path = tmp_path / "my_ik.py"
     path.write_text("def inverse_kinematics(request):\n    return request\n")
-    entrant = Entrant("Mine", str(path), str(path), digest=digest_of(str(path)))
-    scale, key = pickle.dumps(replace(TINY, entrants=(entrant,))), ("arm", "p", "s", "{}")
+    entrant = UserSolver("Mine", str(path), str(path), digest=digest_of(str(path)))
+    scale, key = pickle.dumps(replace(TINY, user_solvers=(entrant,))), ("arm", "p", "s", "{}")
     found = dask.measured("arm", scale, key)
     assert found == {"refused": "there is no block arm, p, s, {}"}
     dask._blocks.cache_clear()

@@ -76,12 +76,12 @@ def flat(names, **more):
 
 def test_entrants_the_best_of_ours_and_of_others_are_labelled_however_far_behind():
     others = [f"s{i}" for i in range(9)]
-    chart = flat(["fabrik", "ccd", "mine", *others], entrants=frozenset({"mine"}))
+    chart = flat(["fabrik", "ccd", "mine", *others], user_solvers=frozenset({"mine"}))
     assert chart.labelled == ["ccd", "mine", "s5", "s6", "s7", "s8"]
-    chart = flat(["s0", "s1", "mine", *OURS], entrants=frozenset({"mine"}))
+    chart = flat(["s0", "s1", "mine", *OURS], user_solvers=frozenset({"mine"}))
     assert chart.labelled == ["s1", "mine", *OURS[-4:]]
     many = [f"entrant {i}" for i in range(8)]
-    chart = flat([*many, "ccd", "s0"], entrants=frozenset(many))
+    chart = flat([*many, "ccd", "s0"], user_solvers=frozenset(many))
     assert chart.labelled == many[-6:]
 
 
@@ -90,7 +90,7 @@ def test_the_best_by_the_measure_of_the_figure_are_those_labelled():
     assert chart.labelled == [f"s{i}" for i in range(6, 12)]
     greatest = replace(chart, better="greater")
     assert greatest.labelled == [f"s{i}" for i in range(6)]
-    assert "s3" in replace(chart, entrants=frozenset({"s3"})).labelled
+    assert "s3" in replace(chart, user_solvers=frozenset({"s3"})).labelled
 
 
 @pytest.mark.parametrize("count", range(1, MAX_LABELLED + 1))

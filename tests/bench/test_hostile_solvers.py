@@ -23,7 +23,7 @@ from plumbob.bench.harness.isolation import WorkerProcess
 from plumbob.bench.harness.progress import TROUBLE, listening
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.protocol import NoAnswerError
-from plumbob.bench.peers.user_solver import Entrant
+from plumbob.bench.peers.user_solver import UserSolver
 from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.reference import Skeleton
 from plumbob.text.sentence import sentence
@@ -183,7 +183,7 @@ def worker():
 
 def solved(spec, targets):
     """What the bench measures of an entrant that is asked for targets."""
-    (peer,) = catalogue.chain_peers([Entrant("hostile", "", spec, tasks=(TASK,))])
+    (peer,) = catalogue.chain_peers([UserSolver("hostile", "", spec, tasks=(TASK,))])
     skeleton = Skeleton(SKELETON["parents"], SKELETON["offsets"])
     problem = TargetsForSkeleton("", "", skeleton, SKELETON["local_rotations"], targets)
     limits = chain.SolverLimits(1e-4, HOSTILE)

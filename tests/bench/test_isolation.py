@@ -171,7 +171,7 @@ def test_the_order_of_a_round_is_drawn_and_all_targets_are_converted_first(targe
         steps.append("converts")
         return lambda: steps.append("solves") or SolverOutput(request.start, True)
 
-    monkeypatch.setitem(timing._asks, 0, ask)
+    monkeypatch.setitem(timing._factories, 0, ask)
     ready, *answers, _ = timing.Turn("fake_solvers", 0, jobs[0], 2, is_first=False).perform()
     assert steps == ["converts"] * 2 + ["solves"] * 3  # the first twice, uncounted once
     assert len(answers) == 2
@@ -186,7 +186,7 @@ def test_a_slow_turn_is_not_silent(targets, monkeypatch):
         ask = lambda request, time=time: (  # noqa: E731
             lambda: sent.append("solve") or SolverOutput(request.start, True, time)
         )
-        monkeypatch.setitem(timing._asks, number, ask)
+        monkeypatch.setitem(timing._factories, number, ask)
     orders = []
     for number in (0, 1):
         sent.clear()
@@ -204,7 +204,7 @@ def test_a_solver_whose_clock_stands_still_uses_up_its_budget(targets, monkeypat
     monkeypatch.setattr(timing, "_LEAST_SECONDS", 0.0)
     monkeypatch.setattr(timing, "_TARGET_SECONDS", 1.0)
     ask = lambda request: lambda: SolverOutput(request.start, True, OwnTime(1e-9, 2.0))  # noqa: E731
-    request = job(targets, "perfect")._replace(entrant="mine")
+    request = job(targets, "perfect")._replace(user_solver="mine")
     assert len(list(request.answers(ask))) == 3  # the third is begun within 4 s
 
 

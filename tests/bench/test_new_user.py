@@ -20,7 +20,7 @@ from plumbob.bench.report.headlines import absent
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
-from plumbob.bench.tables.user_solvers import remarks_of_entrants
+from plumbob.bench.tables.user_solvers import solver_remarks
 from plumbob.cli import selection
 from plumbob.cli.main import run_command
 
@@ -104,7 +104,7 @@ def test_who_offers_no_chains_has_no_row_of_numbers_there(make):
     results = Results([none, make.beyond("ccd", 0.5)])
     assert [row[1] for row in beyond_reach(results).rows] == ["CCD"]
     assert accuracy(results).rows == ()
-    (sentence,) = remarks_of_entrants(results, ["ik"])
+    (sentence,) = solver_remarks(results, ["ik"])
     assert sentence == "Mine was not asked for chains: it offers nothing."
 
 
@@ -172,8 +172,8 @@ def test_the_list_of_all_suites_has_few_lines_with_suites_as_headings(folder, mo
 
 
 def test_entrants_may_make_as_many_iterations_as_ours(folder, records, made):
-    entrants = opening.opened(opening.addresses(["my_ik.py"]), ["ik"])
-    scale = replace(SCALES["quick"], targets=2, entrants=tuple(entrants))
+    entrants = opening.open_solvers(opening.addresses(["my_ik.py"]), ["ik"])
+    scale = replace(SCALES["quick"], targets=2, user_solvers=tuple(entrants))
     asked: dict[str, dict[str, object]] = {}
     for block in blocks("ik", scale):
         if block.problem.startswith(("chain/", "published/fabrik")) and "max_iterations" in (

@@ -11,7 +11,7 @@ import pytest
 
 from plumbob.bench.motion import motion
 from plumbob.bench.show import scenes as shows
-from plumbob.bench.show.scene_solver import YourSolver
+from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.cli import main as cli
 from plumbob.reference import ImplicitEuler, State, curves, resample, scenes, solve_ik
 
@@ -85,7 +85,7 @@ def test_your_arm_stands_beside_ours_with_its_error(capsys, tmp_path):
 
 
 def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tmp_path):
-    mine = YourSolver.open([file(tmp_path, "my_ik.py", IK.format(""))])
+    mine = SceneSolver.open([file(tmp_path, "my_ik.py", IK.format(""))])
     found = shows.arm_motion("circle", "ccd")
     told = []
     positions = mine.follow_curve(*found[:3], lambda done, total: told.append((done, total)))
@@ -97,7 +97,7 @@ def test_an_honest_arm_is_as_near_as_ours_and_each_frame_starts_from_the_last(tm
 
 
 def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
-    yours = YourSolver.open([file(tmp_path, "tracks.py", DOT)])
+    yours = SceneSolver.open([file(tmp_path, "tracks.py", DOT)])
     found = shows.arm_motion("heart", "fabrik")
     positions = yours.follow_curve(*found[:3], lambda *_: None)
     yours.close()
@@ -109,7 +109,7 @@ def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
 def test_the_cloth_by_your_steps_is_as_far_off_as_it_is(tmp_path):
     system, start = scenes.lab_cloth()
     for change, least in (("", 0.0), (" + 1e-3", 1e-3)):
-        yours = YourSolver.open([file(tmp_path, "my_cloth.py", STEP.format(change))])
+        yours = SceneSolver.open([file(tmp_path, "my_cloth.py", STEP.format(change))])
         found = shows.cloth_motion("newton")
         positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
         yours.close()
@@ -130,7 +130,7 @@ def test_a_cloth_that_blows_up_is_shown_until_it_does(tmp_path):
             return {"positions": positions * 1e200, "velocities": velocities}
         """,
     )
-    yours = YourSolver.open([mine])
+    yours = SceneSolver.open([mine])
     found = shows.cloth_motion("newton")
     positions = yours.step_cloth(*found[:2], len(found.positions) - 1, lambda *_: None)
     yours.close()

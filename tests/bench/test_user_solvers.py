@@ -92,7 +92,7 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     for draw in (residuals_chart, iterations_chart):
         assert "My FABRIK" in drawn(draw(Results(records()))).svg
     shows = iterations_chart(Results(records())).shows
-    assert shows.endswith("Entrants claim their iterations.")
+    assert shows.endswith("Users’ solvers claim their iterations.")
     printed = capsys.readouterr().out
     assert re.search(r"My FABRIK ranks \d of 3", " ".join(printed.split()))
 
@@ -235,7 +235,7 @@ def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, caps
 
 
 def entrants(*words):
-    return opening.opened(opening.addresses(words), ["ik"])
+    return opening.open_solvers(opening.addresses(words), ["ik"])
 
 
 def test_names_are_made_distinct_or_refused(folder):
@@ -518,7 +518,7 @@ def test_a_folder_of_models_is_measured_by_ours_and_by_entrants(folder):
         ("--with", "bad.py", "def f(:", "SyntaxError"),
         ("--with", "bad.py", "x = 1", "expected functions named as some of"),
         ("--with", "bad.py", "raise SystemExit(3)", "SystemExit"),
-        ("--with", "bad.py", "def forward_kinematics(a):\n    pass", "suites that ask entrants"),
+        ("--with", "bad.py", "def forward_kinematics(a):\n    pass", "suites for users' solvers"),
         ("--with", "bad.py", None, "bad.py, which does not exist"),
         ("--problem", "bad.py", "def f(:", "SyntaxError"),
         ("--problem", "bad.py", "x = 1", "functions without arguments, got none"),

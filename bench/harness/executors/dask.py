@@ -196,8 +196,8 @@ def measured(suite: str, scale: bytes, key: Key) -> Mapping[str, str]:
 @functools.lru_cache(maxsize=32)
 def _blocks(suite: str, pickled_scale: bytes) -> dict[Key, Block]:
     scale: Scale = pickle.loads(pickled_scale)
-    for entrant in scale.entrants:
-        if (digest := digest_of(entrant.spec)) != entrant.digest:
-            files = f"other ones ({digest}, there {entrant.digest})" if digest else "none"
-            raise ValueError(f"with: expected the files of {entrant.door}, got {files}")
+    for solver in scale.user_solvers:
+        if (digest := digest_of(solver.spec)) != solver.digest:
+            files = f"other ones ({digest}, there {solver.digest})" if digest else "none"
+            raise ValueError(f"with: expected the files of {solver.address}, got {files}")
     return {block_key(block): block for block in blocks(suite, scale)}

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...problems.evaluate import from_pinocchio, pinocchio_model, to_pinocchio
 from ..peer import ONE_START, Peer, Run, restarted
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
 
 PEER = Peer(
     "Pinocchio’s closed loop",
@@ -38,7 +38,7 @@ def prepare(
     iterations: int = 1000,
     damping: float = 1e-12,
     step: float = 0.1,
-) -> Ask:
+) -> SolveFactory:
     """Return the loop, set up for a robot, with steps so long [s]."""
     import pinocchio
 
@@ -46,7 +46,7 @@ def prepare(
     data = model.createData()
     frames = [model.getFrameId(effector) for effector in robot.effectors]
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         targets = [pinocchio.SE3(R, x) for x, R in request.poses]
         q0 = to_pinocchio(robot, request.start)
 
@@ -79,4 +79,4 @@ def prepare(
                 slopes.append(-J[:3])
         return np.concatenate(errors), np.vstack(slopes)
 
-    return ask
+    return make_solve

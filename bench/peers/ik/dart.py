@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, Forward, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/index.md).
 _SETTINGS = {"clamp": 0.5, "length": 1.0, "weight": 1.0}
@@ -36,7 +36,7 @@ def prepare(
     clamp: float = 0.2,
     length: float = 1.0,
     weight: float = 0.4,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot.
 
     A step is clamped to `clamp` for each joint [rad] and the error to `length`; `weight` is the
@@ -55,7 +55,7 @@ def prepare(
     ik.getGradientMethod().setComponentWiseClamp(clamp)
     ik.getSolver().setNumMaxIterations(iterations)
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         target = dartpy.math.Isometry3()
         target.set_rotation(request.rotations[0])
         target.set_translation(request.positions[0])
@@ -67,7 +67,7 @@ def prepare(
 
         return Solve(solve, lambda claim: (skeleton.getPositions(), claim))
 
-    return ask
+    return make_solve
 
 
 def kinematics(robot: BenchRobot) -> Forward:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...clock import library
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, Forward, PoseRequest, Solve, SolveFactory, Tolerance
 
 _SETTINGS = {"feasibility": 1e-8, "inside": 0.5, "centring": 0.0}
 _SNOPT = {"solver": "SNOPT", **_SETTINGS}
@@ -53,7 +53,7 @@ def prepare(
     feasibility: float = 1e-8,
     inside: float = 0.5,
     centring: float = 0.0,
-) -> Ask:
+) -> SolveFactory:
     """Return the program, set up for a robot.
 
     `feasibility` is the solver's tolerance on constraints, `inside` the requested part of the
@@ -77,7 +77,7 @@ def prepare(
     def read(solution: Any) -> tuple[FloatArray, bool]:
         return coordinates.from_drake(solution.GetSolution(ik.q())), solution.is_success()
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         targets = [RigidTransform(RotationMatrix(R), x) for x, R in request.poses]
         q0 = coordinates.to_drake(request.start)
 
@@ -88,7 +88,7 @@ def prepare(
 
         return Solve(solve, read)
 
-    return ask
+    return make_solve
 
 
 def kinematics(robot: BenchRobot) -> Forward:

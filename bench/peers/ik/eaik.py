@@ -14,7 +14,7 @@ import numpy as np
 from ...problems.robots import UnableError
 from ..axes import axes_at_zero, first_within
 from ..peer import RESTARTS, Peer, Run
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
 
 PEER = Peer(
     "EAIK",
@@ -30,30 +30,30 @@ PEER = Peer(
 MAXIMUM_HINGES = 6
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance) -> SolveFactory:
     """Return the solver, set up for a robot; there is no tolerance.
 
     Raises:
         UnableError: if EAIK knows no decomposition of this robot.
     """
-    return _asking(robot, lambda solutions: first_within(robot, solutions))
+    return _solve_factory(robot, lambda solutions: first_within(robot, solutions))
 
 
-def prepare_all(robot: BenchRobot) -> Ask:
+def prepare_all(robot: BenchRobot) -> SolveFactory:
     """Return the solver of all solutions, set up for a robot; see `prepare`."""
-    return _asking(robot, lambda solutions: (solutions, None))
+    return _solve_factory(robot, lambda solutions: (solutions, None))
 
 
-def _asking(robot: BenchRobot, choose: Callable[[FloatArray], Any]) -> Ask:
+def _solve_factory(robot: BenchRobot, choose: Callable[[FloatArray], Any]) -> SolveFactory:
     engine = _engine_of(robot)
 
     def read(solutions: Any) -> Any:
         return choose(solutions.Q[~np.array(solutions.is_LS, dtype=bool)])
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         return Solve(partial(engine.calculate_IK, request.matrix), read)
 
-    return ask
+    return make_solve
 
 
 def _engine_of(robot: BenchRobot) -> Any:

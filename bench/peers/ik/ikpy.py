@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..peer import ONE_START, Peer, Run
-from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, PoseRequest, Solve, SolveFactory, Tolerance
 
 PEER = Peer(
     "ikpy",
@@ -31,7 +31,7 @@ def prepare(
     optimizer: str = "least_squares",
     precision: float = 0.0,
     method: str = "",
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot; there is no tolerance on poses.
 
     `precision` is the precision of its optimizer, if any, `method` a method of the optimizer in
@@ -48,11 +48,11 @@ def prepare(
     options: dict[str, Any] = {"optimizer": optimizer, "tol": precision or None}
     options |= {"optimizer_kwargs": {"method": method}} if method else {}
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         target, q0 = (request.positions[0], request.rotations[0], "all"), np.zeros(len(moving))
         q0[moving] = request.start
 
         solve = partial(chain.inverse_kinematics, *target, initial_position=q0, **options)
         return Solve(solve, lambda q: (q[moving], None))
 
-    return ask
+    return make_solve

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...problems.evaluate import mujoco_model
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
 
 PEER = Peer(
     "mujoco.minimize",
@@ -38,7 +38,7 @@ def prepare(
     minimum: float = 1e-6,
     factor: float = 10.0**0.1,
     scale: str = "",
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot.
 
     `minimum` is the least damping, `factor` the change of damping, `scale` the rule for
@@ -52,7 +52,7 @@ def prepare(
     options |= {"mu_min": minimum, "mu_factor": factor, "x_scale": scale or None}
     reach = _Reach(robot)
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         problem = (request.start[:, None], reach.residuals, bounds, reach.jacobian)
 
         def solve() -> FloatArray:
@@ -65,7 +65,7 @@ def prepare(
 
         return Solve(solve, read)
 
-    return ask
+    return make_solve
 
 
 class _Reach:

@@ -13,7 +13,7 @@ from ...problems.evaluate import evaluator_of, mujoco_model
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
 from ..differential import PhasedReach, meeting, reaching
 from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/mink.md).
 _SETTINGS = {"damping": 1e-12, "lm_damping": 0.001, "gain": 1.0, "limit_gain": 0.95}
@@ -48,7 +48,7 @@ def prepare(
     gain: float = 1.0,
     limit_gain: float = 0.95,
     phases: int = 1,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot."""
     import mink
 
@@ -66,7 +66,7 @@ def prepare(
         phased = (parts, _rotated, (*goal, phases))
         reach = PhasedReach(mink.solve_ik, configuration, *phased, **options)
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         targets = [
             mink.SE3.from_rotation_and_translation(mink.SO3.from_matrix(R), x)
             for x, R in request.poses
@@ -74,7 +74,7 @@ def prepare(
         solve = partial(reach, targets, request.start)
         return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
-    return ask
+    return make_solve
 
 
 def _rotated(target: Any, R: FloatArray) -> Any:

@@ -18,7 +18,15 @@ from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, 
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
 from ..differential import PhasedReach, meeting, reaching
 from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance, UnableError
+from ..protocol import (
+    BenchRobot,
+    FloatArray,
+    PoseRequest,
+    Solve,
+    SolveFactory,
+    Tolerance,
+    UnableError,
+)
 
 # The search chose these on the tuning robots (docs/peers/pink.md).
 _SETTINGS = {"damping": 1e-6, "lm_damping": 0.0, "gain": 1.0, "limit_gain": 0.5}
@@ -52,7 +60,7 @@ def prepare(
     gain: float = 1.0,
     limit_gain: float = 0.5,
     phases: int = 1,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot."""
     import pink
 
@@ -67,12 +75,12 @@ def prepare(
         phased = (parts, _rotated, (*goal, phases))
         reach = PhasedReach(pink.solve_ik, configuration, *phased, **options)
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
         solve = partial(reach, targets, to_pinocchio(robot, request.start))
         return Solve(solve, lambda claim: (from_pinocchio(robot, configuration.q), claim))
 
-    return ask
+    return make_solve
 
 
 def _rotated(target: Any, R: FloatArray) -> Any:

@@ -28,7 +28,7 @@ from ...problems.robot_tasks import (
 from ...problems.robots import UnableError
 from ..packages import environment_python
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, OwnTime, SolverOutput, Tolerance
+from ..protocol import BenchRobot, OwnTime, SolveFactory, SolverOutput, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/index.md).
 _SETTINGS = {"regularization": 1e-4, "weight": 0.3}
@@ -59,7 +59,7 @@ def prepare(
     iterations: int = 100,
     regularization: float = 1e-6,
     weight: float = 1.0,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot.
 
     Raises:
@@ -94,7 +94,7 @@ def prepare_task(
 
 
 def _program(robot: BenchRobot, goal: dict[str, Any]) -> Callable[..., Callable[[], SolverOutput]]:
-    """Return a function to ask a program for a goal of a robot."""
+    """Return a function that turns requests into calls of a program with a goal."""
     robot.require_chain()
     program = ChildProcess([environment_python("placo"), "-I", PROGRAM])
     chain = {"text": robot.text, "effector": robot.effectors[0], "joints": robot.joints}
@@ -104,21 +104,21 @@ def _program(robot: BenchRobot, goal: dict[str, Any]) -> Callable[..., Callable[
         why = "PlaCo does not read the robot, or orders its joints otherwise"
         raise UnableError(why) from None
 
-    def ask(**question: Any) -> Callable[[], SolverOutput]:
+    def make_solve(**request: Any) -> Callable[[], SolverOutput]:
         def solve() -> SolverOutput:
-            claim, seconds, q, library_seconds = _answer(program, question)
+            claim, seconds, q, library_seconds = _answer(program, request)
             report_library(library_seconds)
             return SolverOutput(np.array(q), claim, OwnTime(float(seconds)))
 
         return solve
 
-    return ask
+    return make_solve
 
 
-def _answer(program: ChildProcess, question: object) -> Any:
+def _answer(program: ChildProcess, request: object) -> Any:
     """Return the program's answer, or raise ConnectionError after its end."""
     try:
-        program.send(f"{json.dumps(question)}\n".encode())
+        program.send(f"{json.dumps(request)}\n".encode())
         return json.loads(program.receive())
     except LostError:
         raise ConnectionError("the program of PlaCo has ended") from None

@@ -32,7 +32,7 @@ from ...problems.robot_tasks import (
     middle,
 )
 from ..peer import ONE_START, PORTFOLIO, RESTARTS, Peer, Run
-from ..protocol import Ask, BenchRobot, FloatArray, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search found that more iterations and restarts gain nothing (docs/peers/index.md).
 _LM = {"solver": "levenberg_marquardt", "iterations": 100}
@@ -64,7 +64,7 @@ def prepare(
     iterations: int = 200,
     phases: int | None = None,
     prepared: bool = True,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot; `prepare_ik` takes a single effector."""
     read = urdf.parse if robot.is_chain else mjcf.parse
     articulation = read(robot.text).articulation
@@ -81,25 +81,25 @@ def prepare(
 
         return ask_prepared
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         x, R, start = request
         quaternions = rotation.from_matrix(R) if robot.oriented else [None] * len(x)
         targets = [*map(Target, x, quaternions, robot.effectors)]
 
         return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
 
-    return ask
+    return make_solve
 
 
-def prepare_all(robot: BenchRobot) -> Ask:
+def prepare_all(robot: BenchRobot) -> SolveFactory:
     """Return the solver of all solutions, set up for a chain."""
     articulation = urdf.parse(robot.text).articulation
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         target = Target(request.positions[0], rotation.from_matrix(request.rotations[0]))
         return Solve(partial(all_solutions, articulation, target), lambda s: (s.coordinates, None))
 
-    return ask
+    return make_solve
 
 
 def _read(solution: IKSolution | TaskSolution) -> tuple[FloatArray | None, bool]:
@@ -114,13 +114,13 @@ def prepare_task(
     # of an entry of a residual, so that its three keep it together
     settings: dict[str, Any] = {"tolerance": tolerance / 3.0**0.5, "restarts": restarts}
 
-    def ask(request: TaskRequest) -> Solve:
+    def make_solve(request: TaskRequest) -> Solve:
         goal = tasks.configuration(arm.articulation, request.goal)
         parts = [_task(robot, part, arm, goal, base) for part in task.parts]
         solve = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
         return Solve(solve, _read)
 
-    return ask
+    return make_solve
 
 
 def _task(

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, FloatArray, Forward, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/index.md).
 _SETTINGS = {"damping": 1e-3, "inside": 0.1}
@@ -50,7 +50,7 @@ def prepare(
     inside: float = 0.1,
     limits: bool = False,
     check: bool = False,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot, with a damping or with limits.
 
     The solver stops within the part `inside` of the tolerance on distance; angles come along.
@@ -67,7 +67,7 @@ def prepare(
     else:
         options |= {"jointDamping": [damping] * len(robot.joints)}
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         pose = request.positions[0].tolist(), request.quaternion.tolist()
         start = request.start.tolist()
         poses = {"currentPositions": start} | ({"restPoses": start} if limits else {})
@@ -79,7 +79,7 @@ def prepare(
 
         return Solve(solve, read)
 
-    return ask
+    return make_solve
 
 
 def kinematics(robot: BenchRobot) -> Forward:

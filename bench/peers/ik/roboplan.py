@@ -12,7 +12,7 @@ import numpy as np
 
 from ...clock import library
 from ..peer import ONE_START, Peer, Run, restarted, short_attempts
-from ..protocol import Ask, BenchRobot, Forward, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, Forward, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/index.md).
 _LIMITS = {"gain": 1.0, "limit_gain": 0.5}
@@ -46,7 +46,7 @@ def prepare(
     lm_damping: float = 0.0,
     gain: float = 1.0,
     limit_gain: float = 1.0,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot."""
     from roboplan import core, optimal_ik
 
@@ -76,11 +76,11 @@ def prepare(
             return False
         return rotation_angle(pose[:3, :3], target[:3, :3]) <= tolerance.rotation
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         matrix, start = np.asfortranarray(request.matrix), request.start.copy()
         return Solve(lambda: reach(matrix, start), lambda answer: answer)
 
-    return ask
+    return make_solve
 
 
 def rotation_angle(a: np.ndarray, b: np.ndarray) -> float:

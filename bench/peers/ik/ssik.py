@@ -18,7 +18,16 @@ import numpy as np
 
 from ...problems.robots import UnableError
 from ..peer import RESTARTS, Peer, Run
-from ..protocol import Ask, BenchRobot, FloatArray, Forward, PoseRequest, Solve, Tolerance, describe
+from ..protocol import (
+    BenchRobot,
+    FloatArray,
+    Forward,
+    PoseRequest,
+    Solve,
+    SolveFactory,
+    Tolerance,
+    describe,
+)
 
 PEER = Peer(
     "ssik",
@@ -35,33 +44,33 @@ PEER = Peer(
 LONG_BUILDS = ("baxter", "tiago_pro")
 
 
-def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> Ask:
+def prepare(robot: BenchRobot, tolerance: Tolerance, solutions: int = 1) -> SolveFactory:
     """Return the solver, set up for a robot, which stops at so many solutions."""
     run = built_solver(robot).solve
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         options = {"max_solutions": solutions, "q_seed": request.start}
         return Solve(partial(run, request.matrix, **options), _read)
 
-    return ask
+    return make_solve
 
 
 def _read(solutions: list[Any]) -> tuple[FloatArray | None, bool]:
     return (solutions[0].q, True) if solutions else (None, False)
 
 
-def prepare_all(robot: BenchRobot) -> Ask:
+def prepare_all(robot: BenchRobot) -> SolveFactory:
     """Return the solver of all solutions, without copies by whole revolutions."""
     run = built_solver(robot).solve
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         return Solve(partial(run, request.matrix, enumerate_windings=False), read)
 
     def read(solutions: list[Any]) -> tuple[FloatArray, None]:
         rows = np.array([solution.q for solution in solutions])
         return rows.reshape(-1, len(robot.joints)), None
 
-    return ask
+    return make_solve
 
 
 def kinematics(robot: BenchRobot) -> Forward:

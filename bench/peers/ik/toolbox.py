@@ -12,7 +12,7 @@ import numpy as np
 
 from ...problems.robots import links
 from ..peer import ONE_START, PORTFOLIO, RESTARTS, Peer, Run
-from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search found no better damping on the tuning robots (docs/peers/robotics_toolbox.md).
 _DAMPING = {"damping": "chan", "factor": 0.1}
@@ -42,7 +42,7 @@ def prepare(
     searches: int = 100,
     iterations: int = 30,
     limits: bool = True,
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot.
 
     `method` is NR, GN or LM, the last with a rule of damping and its factor.
@@ -56,11 +56,11 @@ def prepare(
         options |= {"method": damping, "k": factor}
     run: Any = {"LM": chain.ik_LM, "NR": chain.ik_NR, "GN": chain.ik_GN}[method]
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         solve = partial(run, request.matrix, q0=request.start, **options)
         return Solve(solve, lambda solution: (solution.q, bool(solution.success)))
 
-    return ask
+    return make_solve
 
 
 def chain_of_transforms(robot: BenchRobot) -> Any:

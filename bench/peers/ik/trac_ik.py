@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from functools import partial
 
 from ..peer import RESTARTS, Peer, Run
-from ..protocol import Ask, BenchRobot, PoseRequest, Solve, Tolerance
+from ..protocol import BenchRobot, PoseRequest, Solve, SolveFactory, Tolerance
 
 PEER = Peer(
     "TRAC-IK",
@@ -31,7 +31,7 @@ PEER = Peer(
 
 def prepare(
     robot: BenchRobot, tolerance: Tolerance, seconds: float = 0.005, kind: str = "Speed"
-) -> Ask:
+) -> SolveFactory:
     """Return the solver, set up for a robot, with so much time for each target [s]."""
     import pytracik
 
@@ -40,11 +40,11 @@ def prepare(
     chain = (robot.root, robot.effectors[0], robot.text)
     engine = pytracik.TRAC_IK(*chain, seconds, eps, solve_type)
 
-    def ask(request: PoseRequest) -> Solve:
+    def make_solve(request: PoseRequest) -> Solve:
         target = (*request.positions[0], *request.quaternion)
         return Solve(partial(pytracik.ik, engine, request.start, *target), _read)
 
-    return ask
+    return make_solve
 
 
 def _read(answer: Sequence[float]) -> tuple[Sequence[float] | None, bool]:
