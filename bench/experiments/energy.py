@@ -120,10 +120,12 @@ def _summary(records: Sequence[Record]) -> Summary:
     if not undamped:
         return Summary()
     changes = {abs(record.values.left[-1] - 1.0): label(record.solver) for record in undamped}
+    order = (
+        f"; after {settings(undamped, 'steps')} steps {changes[min(changes)]} is nearest to that, "
+        f"and {changes[max(changes)]} farthest."
+    )
     return Summary(
-        "Without dampers the energy should stay constant; after "
-        f"{settings(undamped, 'steps')} steps {changes[min(changes)]} is nearest to that, and "
-        f"{changes[max(changes)]} farthest.",
+        "Without dampers the energy should stay constant" + (order if len(changes) > 1 else "."),
         tuple(map(_point, undamped)),
     )
 

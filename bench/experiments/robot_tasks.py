@@ -90,8 +90,9 @@ def meet(name: str, task_name: str, peer: Peer, kind: str, count: int, seed: int
 
 # What is shown.
 
+from ..ranking.scores import PENALTY
 from ..tables.captions import Captions
-from ..tables.columns import text
+from ..tables.columns import text, words_in
 from ..tables.results import Results, grouped, listed
 from ..tables.table import INTERVAL, Column, Summary, listing, words
 
@@ -124,12 +125,17 @@ def _median(title: str, unit: str, read: Callable[[TaskValues], Floats1], **look
     return Column(f"{title}, median", unit, read=cell, **looks)
 
 
+def _penalised_seconds(values: TaskValues) -> Floats1:
+    """Return the time of each target, at least the penalty where the task is not met [s]."""
+    return metrics.penalised(values.seconds, values.solved, PENALTY)
+
+
 COLUMNS = (
     text("task", lambda row: row.task),
     text("attempts", lambda row: row.attempts),
     text("solver", lambda row: row.solver),
     Column("solved", note=INTERVAL, best="greatest", read=lambda row: row.solved),
-    _median("time", "ms", lambda values: values.seconds, best="least"),
+    _median("time", "ms", _penalised_seconds, best="least"),
     text("remark", lambda row: row.records[0].values.remark),
     _median("distance", "rad", lambda values: values.distance[values.solved], folded=True),
 )
@@ -152,6 +158,7 @@ def _summary(rows: Sequence[SolverTask]) -> Summary:
 _CAPTIONS = Captions(
     __file__,
     tolerance=words(TOLERANCE),
+    penalty=words_in(PENALTY, "ms"),
     restarts=words(PLUMBOB_LM.first(RESTARTS).settings["restarts"]),
 )
 

@@ -46,4 +46,7 @@ def test_table_and_sentence_follow_the_records(make):
     assert table.rows[0][2:] == (50.0, None, None, 100.0, 50.0)
     (point,) = table.summary.points
     assert all(part in point for part in ("RK4", "50.0 %", "100 %"))
+    assert "nearest" not in table.summary.sentence, "one integrator is not compared"
+    both = Results([make.swung("RK4", left=left), make.swung("discrete", left=(1.0, 0.9))])
+    assert "discrete is nearest to that, and RK4 farthest" in suite.energy(both).summary.sentence
     assert suite.energy(Results([damped])).summary.sentence == ""

@@ -83,3 +83,5 @@ def test_the_table_adds_up_the_robots(make):
     share, none = column(table, "solved (95 % interval)")
     assert (share.hits, share.total, none) == (2, 4, None)
     assert "Plumbob 2/4" in table.summary.points[0]
+    (milliseconds,) = column(table, "time, median [ms]")[:1]
+    assert milliseconds >= 50.0, "two of four targets are missed, which count as 100 ms"
