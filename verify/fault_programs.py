@@ -1,11 +1,14 @@
 """The known faults by code, each with a short wrong program and the right one.
 
-`programs.toml` has the right programs. The entry of a fault in a `faults.toml` has pairs of a right
-and a wrong text, `lines`: the right program with the first replaced by the second is the wrong one.
+`programs.toml` lists the right programs. The entry of a fault in a `faults.toml` has pairs of a
+right and a wrong text, `lines`: the right program with the first replaced by the second is the
+wrong one.
 """
 
+import ast
+import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import chain
 from pathlib import Path
@@ -21,10 +24,9 @@ FOLDER = Path(__file__).parent
 # The files with faults, those of kinematics first.
 FILES = sorted(FOLDER.rglob("faults.toml"))
 _TABLE = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
-PROGRAMS: Mapping[str, Any] = {
-    name: {**_TABLE.get(entry.get("like"), {}), **entry} for name, entry in _TABLE.items()
-}
-FAMILIES: Mapping[str, Any] = PROGRAMS["families"]
+PROGRAMS: Mapping[str, Any] = _TABLE["programs"]
+FAMILIES: Mapping[str, Any] = _TABLE["families"]
+NOTES: Mapping[str, Any] = _TABLE["notes"]
 
 
 class CodedFault(NamedTuple):
@@ -90,14 +92,37 @@ def _replaced(program: str, right: str, wrong: str, margin: str) -> str:
     return before + first + "".join(margin + line for line in others) + after
 
 
+@cache
 def source_of(program: str) -> str:
-    """Return the source of a right program, given its name."""
+    """Return the source of a right program, given its name: imports, its parts, its functions."""
     entry = PROGRAMS[program]
-    texts = [*(PROGRAMS["parts"][part] for part in entry["parts"]), entry["text"]]
-    source = "\n\n\n".join(text.strip("\n") for text in texts) + "\n"
-    for old, new in entry.get("replaced", ()):
-        source = source.replace(old, new)
-    return source
+    name = re.sub(r"\W+", "_", program.lower().replace("'", ""))
+    imports, bodies = dict[str, None](), dict[str, str]()
+    _collect(entry.get("file", name), entry.get("replaced", ()), imports, bodies)
+    return "\n".join(imports) + "\n\n\n" + "\n\n\n".join(bodies.values()) + "\n"
+
+
+def _collect(
+    module: str,
+    replaced: Sequence[tuple[str, str]],
+    imports: dict[str, None],
+    bodies: dict[str, str],
+) -> None:
+    """Add the imports and the body of a module, after those of the parts that it imports."""
+    path = FOLDER / "programs" / f"{module.replace('.', '/')}.py"
+    text = path.read_text(encoding="utf-8")
+    for old, new in replaced:
+        text = text.replace(old, new)
+    nodes = ast.parse(text).body[1:]  # without the docstring
+    is_import = [isinstance(node, ast.Import | ast.ImportFrom) for node in nodes]
+    start = nodes[is_import.index(False)].lineno - 1
+    for node in nodes[: is_import.index(False)]:
+        if isinstance(node, ast.ImportFrom) and node.level:
+            part = node.module or ""
+            _collect(part if "." in part else f"parts.{part}", replaced, imports, bodies)
+        else:
+            imports[ast.unparse(node)] = None
+    bodies.setdefault(module, "\n".join(text.splitlines()[start:]))
 
 
 @cache

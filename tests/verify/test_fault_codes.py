@@ -201,7 +201,7 @@ def test_a_mistake_that_lines_alone_show_is_named_by_its_code(code, monkeypatch)
     test_a_wrong_program_is_named_by_its_code(code)
 
 
-RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items() if "task" in entry}
+RIGHT_PROGRAMS = {name: entry["task"] for name, entry in PROGRAMS.items()}
 RESERVED = ("robot", "robot_track")
 
 

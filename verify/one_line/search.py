@@ -17,7 +17,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..case import Case
 from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, explain
-from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
+from ..fault_programs import NOTES, PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..gaps import difference
 from ..greeting import Greeting, Step
@@ -264,8 +264,7 @@ def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
 
 def _is_of(program: str, task: str, method: str) -> bool:
     """Return whether a right program has a task, and a method of it."""
-    entry = PROGRAMS[program]
-    return entry.get("task") == task and f"def {method}" in entry["text"]
+    return bool(PROGRAMS[program]["task"] == task) and f"def {method}" in source_of(program)
 
 
 def _programs(report: TaskReport, step: Step) -> Iterator[Program]:
@@ -405,7 +404,7 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
             words = sentence("{one} Or, as well, `{wrong}` in the place of `{right}`.",
                              one=words, right=right, wrong=wrong)  # fmt: skip
             break
-    for note in PROGRAMS["notes"].values():
+    for note in NOTES.values():
         if any(text in mutant.right for text in note["texts"]):
             words = sentence("{words} {note}", words=words, note=Sentence(note["sentence"], {}))
     return with_code(entry["code"], words)

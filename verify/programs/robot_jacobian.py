@@ -1,0 +1,8 @@
+"""Robot jacobian."""
+
+from .parts.mechanism import tool_jacobian
+
+
+def robot_jacobian(q, **robot):
+    J, tool_rotation = tool_jacobian(q, **robot)
+    return {"jacobian": J}
