@@ -34,10 +34,12 @@ class SmallDiscipline:
             for i, inputs in enumerate(made)
         ]  # fmt: skip
 
-    def judge(self, asked, greeting, method, cause_search=None):
-        judgements = [self._judged(one) for one in asked]
-        wrong = [a for a, j in zip(asked, judgements, strict=True) if j.verdict is Verdict.WRONG]
-        return TaskReport(self.task, method, judgements, self._why(wrong))
+    def judge(self, asked, greeting, method):
+        return TaskReport(self.task, method, [self._judged(one) for one in asked], Diagnosis())
+
+    def diagnose(self, judged):
+        pairs = zip(judged.exchanges, judged.report.judgements, strict=True)
+        return self._why([one for one, j in pairs if j.verdict is Verdict.WRONG])
 
     def _judged(self, one: Exchange):
         expected = self.right(one.case)

@@ -6,11 +6,15 @@ of the mistake alone.
 
 import signal
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 from plumbob.text.sentence import Sentence, sentence
+
+from .contestant import Exchange
+from .greeting import Greeting
+from .judgement import TaskReport
 
 T = TypeVar("T")
 # The processor time that the search for the cause of one task's answers may take [s]: wall time
@@ -87,6 +91,21 @@ class NoSearch(CauseSearch):
     def is_on(self) -> bool:
         """Whether stages run."""
         return False
+
+
+class JudgedAnswers(NamedTuple):
+    """Answers to a task with their verdict, and what is known when their cause is sought."""
+
+    report: TaskReport
+    greeting: Greeting  # by which they are judged
+    search: CauseSearch
+    # faults of what the task builds upon; None if it is right, or they are not known
+    base: Sequence[Any] | None = None
+
+    @property
+    def exchanges(self) -> Sequence[Exchange]:
+        """The answers."""
+        return self.report.exchanges
 
 
 def _expire(*_: Any) -> None:

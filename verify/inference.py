@@ -18,12 +18,14 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence, sentence
 
+from . import precision
 from .case import Case
 from .constants import MEASURES, is_unread
 from .contestant import Answer, Contestant, Failure, is_hung
+from .examination import Examination
 from .gaps import largest_gap
 from .greeting import Greeting
-from .judgement import Explanation, TaskReport, Verdict
+from .judgement import TaskReport, Verdict
 from .kinematics.robot_models import urdf
 from .task import TASKS
 
@@ -82,24 +84,17 @@ _ADDED = ("rest_positions", "previous_positions")
 _EITHER = ("count", "spacing")
 
 
-class Inference(NamedTuple):
-    """The restrictions that a solver's answers show."""
+def examine(examination: Examination, report: TaskReport) -> TaskReport:
+    """Return the report by the restrictions of a solver, the same report if none show.
 
-    evidence: Evidence  # () if it takes all, or nothing is known
-    is_right: bool = False  # whether a solver of such restrictions answers so
-
-
-def infer(
-    contestant: Contestant, report: TaskReport, judge: Callable[[Greeting], TaskReport]
-) -> Inference:
-    """Return the restrictions of a solver whose answers are wrong, the fewest that make it right.
-
-    `judge` returns the report by another greeting.
+    Of restrictions that make it right the fewest are taken; a solver that is wrong with them too
+    gets both said.
     """
+    contestant = examination.contestant
     greeting = contestant.greeting
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
     if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
-        return Inference(())
+        return report
     is_sound = report.verdict is Verdict.RIGHT_EXCEPT
     evidence = [
         (known, why)
@@ -108,35 +103,27 @@ def infer(
         if (why := _evidence(contestant, report, r))
         if (known := _with_constant(contestant, report, r))
     ]
+    if not evidence:
+        return report
 
-    def is_right(items: Evidence) -> bool:
-        return judge(restricted(greeting, items)).verdict <= Verdict.RIGHT_EXCEPT
+    def judged(items: Evidence) -> TaskReport:
+        return precision.examine(examination, examination.judge(restricted(greeting, items)))
 
-    if not evidence or not is_right(evidence):
-        return Inference(() if is_sound else evidence)
+    best = judged(evidence)
+    if best.verdict > Verdict.RIGHT_EXCEPT:
+        is_worse = is_sound or _passed(best) < _passed(report)
+        return report if is_worse else _restricted_report(report, best, evidence)
     for item in [item for item in evidence if not item[0].measured]:
         fewer = [other for other in evidence if other is not item]
-        evidence = fewer if fewer and is_right(fewer) else evidence
-    return Inference(evidence, is_right=True)
+        if fewer and (simpler := judged(fewer)).verdict <= Verdict.RIGHT_EXCEPT:
+            evidence, best = fewer, simpler
+    return _restricted_report(report, best, evidence)
 
 
-def inferred(
-    report: TaskReport,
-    greeting: Greeting,
-    inference: Inference,
-    judge: Callable[[Greeting], TaskReport],
-) -> TaskReport:
-    """Return the report by a solver's restrictions, the same report if it has none or is wrong.
-
-    A report on a restricted solver says so in its assumptions, and keeps the faults that explain
-    the other answers.
-    """
-    if not inference.evidence:
-        return report
-    best = judge(restricted(greeting, inference.evidence))
-    if not inference.is_right and _share(best) <= _share(report):
-        return report
-    return _restricted_report(report, best, inference.evidence)
+def _passed(report: TaskReport) -> float:
+    """Return the share of the cases with right answers."""
+    passed = [judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in report.judgements]
+    return sum(passed) / max(len(passed), 1)
 
 
 def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
@@ -188,23 +175,8 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
         if is_asked
         else sentence("Declare it with {declaration}.", declaration=declaration)
     )  # fmt: skip
-    if best.verdict <= Verdict.RIGHT_EXCEPT and report.diagnosis.explained:
-        explanations = tuple(
-            replace(
-                explanation,
-                sentence=sentence("If that is not meant: {what}", what=explanation.sentence),
-            )
-            for explanation in report.diagnosis.explanations
-            if not {code.split("-")[1] for code in explanation.codes} <= {"CLAIM"}
-        )  # what answers say of themselves is right where the restriction is meant
-        best = replace(best, diagnosis=replace(best.diagnosis, explanations=explanations))
-    return replace(best, assumptions=(*best.assumptions, *notes), is_asked=is_asked)
-
-
-def _share(report: TaskReport) -> float:
-    """Return the share of the answers that the best explanation reproduces."""
-    explanations: Sequence[Explanation] = report.diagnosis.explanations
-    return max((explanation.share for explanation in explanations), default=0.0)
+    assumptions = (*best.assumptions, *notes)
+    return replace(best, assumptions=assumptions, is_asked=is_asked, original=report)
 
 
 def _evidence(

@@ -1,7 +1,7 @@
 """Findings about answers, their verdicts, and the reports on tasks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
@@ -9,7 +9,7 @@ from typing import Any
 from plumbob.text.sentence import Sentence, codes_in, sentence
 
 from .case import Case
-from .contestant import Answer, Failure
+from .contestant import Answer, Exchange, Failure
 from .greeting import Greeting
 
 # The least share of the answers that a likely fault reproduces.
@@ -97,6 +97,9 @@ class Diagnosis:
     hints: tuple[Sentence, ...] = ()  # at mistakes that no variant has
     variant_count: int = 0  # number of variants that were compared
     is_double: bool = False  # whether the answers have more digits than single precision leaves
+    is_certain: bool = False  # whether no other cause is sought
+    # by case, the answer of the same program without the fault, where many answers are right
+    expected: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def share(self) -> float:
@@ -139,6 +142,9 @@ class TaskReport:
     # what it is judged by instead of the greeting: another precision, chains only, one mass
     assumptions: tuple[Sentence, ...] = ()
     is_asked: bool = False  # whether something assumed is a mistake unless it is declared
+    exchanges: Sequence[Exchange] = ()
+    greeting: Greeting | None = None  # by which they are judged
+    original: "TaskReport | None" = None  # by the solver's own greeting, if it is judged by another
 
     @property
     def smallest_failure(self) -> CaseJudgement | None:

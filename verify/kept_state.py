@@ -8,6 +8,7 @@ from pathlib import Path
 from plumbob.text.sentence import Sentence, with_code
 
 from .contestant import Answer, Contestant, is_hung
+from .examination import Examination
 from .gaps import difference
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
@@ -20,12 +21,13 @@ SAME = 1e-6
 STEPS = ("mass_spring_step", "mass_spring_motion")
 
 
-def with_kept_state(contestant: Contestant, report: TaskReport) -> TaskReport:
+def examine(examination: Examination, report: TaskReport) -> TaskReport:
     """Return the report with the fault that answers depend on earlier requests, if they do.
 
     Other mistakes that explain such answers do so by chance, except of steps, where what is kept is
     a matrix or a state.
     """
+    contestant = examination.contestant
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
     if report.verdict < Verdict.WRONG or contestant.greeting.system.continues or is_stuck:
         return report
@@ -34,10 +36,11 @@ def with_kept_state(contestant: Contestant, report: TaskReport) -> TaskReport:
     if not share:
         return report
     words = with_code(FAULT["code"], Sentence(FAULT["sentence"], {}))
-    explanations = [Explanation((NAME,), words, share, 0.0)]
-    if report.task in STEPS:
-        explanations += report.diagnosis.explanations
-    diagnosis = replace(report.diagnosis, explanations=tuple(explanations), first_broken=None)
+    explanations = (Explanation((NAME,), words, share, 0.0),)
+    is_certain = report.task not in STEPS
+    diagnosis = replace(
+        report.diagnosis, explanations=explanations, first_broken=None, is_certain=is_certain
+    )
     return replace(report, diagnosis=diagnosis)
 
 

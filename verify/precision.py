@@ -1,6 +1,7 @@
 """Infer a solver's precision from its answers: many compute in floats without declaring it."""
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from decimal import Decimal, DecimalTuple
 from typing import Any
 
@@ -10,8 +11,9 @@ import numpy as np
 from plumbob.text.sentence import Sentence, sentence
 
 from .contestant import Answer, Exchange
+from .examination import Examination
 from .greeting import Greeting
-from .judgement import TaskReport
+from .judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 
 # The numbers of an output that suffice, since 99 % of doubles have 15 digits or more; requests with
 # no larger share of such numbers are left out.
@@ -90,6 +92,38 @@ def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
     return [Decimal(repr(x)).normalize().as_tuple() for x in numbers.tolist()]
 
 
+def examine(examination: Examination, report: TaskReport) -> TaskReport:
+    """Return the report on wrong answers as rounded ones, or judged in single precision.
+
+    They are so judged if that makes them right, or those of them that it makes right have errors
+    of single precision: the others are wrong in it too.
+    """
+    greeting = report.greeting
+    if report.verdict is not Verdict.WRONG or greeting is None:
+        return report
+    places = decimal_places(report.exchanges)
+    if places is not None:
+        words = sentence(
+            "All numbers of its answers are rounded to {places} decimals. Return all digits.",
+            places=places,
+        )
+        return replace(report, diagnosis=Diagnosis(first_broken=words, is_certain=True))
+    if greeting.precision == "single" or report.diagnosis.is_double or _is_exact(report):
+        return report
+    single = examination.judge(
+        msgspec.structs.replace(greeting, precision="single"), report.exchanges
+    )
+    forgiven = [
+        before
+        for before, after in zip(report.judgements, single.judgements, strict=True)
+        if before.verdict >= Verdict.WRONG > after.verdict
+    ]
+    is_right = single.verdict <= Verdict.RIGHT_EXCEPT
+    if not are_off_by_single(report.judgements if is_right else forgiven):
+        return report
+    return replace(single, assumptions=(INEXACT,))
+
+
 def decimal_places(exchanges: Sequence[Exchange]) -> int | None:
     """Return the few decimals that all answers are rounded to, None if they have more."""
     numbers = np.concatenate([*_outputs(exchanges).values(), ()])
@@ -118,7 +152,7 @@ def _long_numbers(arrays: Iterable[Any]) -> np.ndarray:
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
 
 
-def is_exact(report: TaskReport) -> bool:
+def _is_exact(report: TaskReport) -> bool:
     """Return whether lengths are kept as only double precision keeps them, in most answers."""
     errors = [
         finding.error
@@ -135,8 +169,8 @@ def has_double(report: TaskReport) -> bool:
     return sum(count > DOUBLE for count in digits) >= MIN_DOUBLE
 
 
-def is_off_by_single(report: TaskReport) -> bool:
+def are_off_by_single(judgements: Sequence[CaseJudgement]) -> bool:
     """Return whether the errors of most answers are those of single precision."""
-    counts = (judgement.digits for judgement in report.judgements)
+    counts = (judgement.digits for judgement in judgements)
     digits = [count for count in counts if count is not None] or [0.0]
     return min(digits) >= CORRECT[0] and float(np.median(digits)) <= CORRECT[1]

@@ -6,11 +6,12 @@ from typing import Any
 
 from plumbob.text.printable import harmless, visible
 
+from .disciplines import DISCIPLINES
 from .door.host import PythonSolver
 from .functions import FunctionContestant
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
-from .verify import DISCIPLINES, judge_cases, trials
+from .verify import judge_cases, trials
 
 
 def laws(

@@ -1,38 +1,26 @@
 """Ask a solver every case of its tasks, judge its answers, and explain wrong answers."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import NamedTuple, Protocol
 
 import msgspec
 
 from plumbob.text.sentence import Sentence, codes_in, sentence
 
-from . import precision
+from . import inference, kept_state, precision
 from .case import Case
-from .cause_search import SECONDS, CauseSearch, NoSearch
+from .cause_search import SECONDS, CauseSearch, JudgedAnswers
 from .contestant import Contestant, Exchange, Failure, NoGreetingError, is_hung
+from .disciplines import DISCIPLINES
+from .examination import Examiner
 from .greeting import Greeting
-from .inference import Inference, infer, inferred, methods_of
-from .judgement import Diagnosis, Report, TaskReport, Verdict
-from .kept_state import with_kept_state
-from .kinematics import (
-    faults,
-    forward_kinematics,
-    inverse_kinematics,
-    resample,
-    robot_inverse_kinematics,
-    robot_jacobian,
-    robot_track,
-    robot_velocity,
-    track,
-)
+from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
+from .kinematics import faults, inverse_kinematics, robot_inverse_kinematics, robot_jacobian
 from .kinematics.claims import OF_WRONG_POSES
 from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
-from .mass_spring.stepping import Stepping
 from .one_line.search import with_changed_line
 from .task import BUILDS_ON
 from .timing import with_lesser_time
@@ -45,37 +33,8 @@ WITH_METHODS = ("inverse_kinematics", "track")
 Notify = Callable[[Sentence, int, int | None], None]
 
 
-class Discipline(Protocol):
-    """A module that tries one task."""
-
-    def cases(self, greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-        """Return cases that suit the solver, from trivial to hostile, the smallest first."""
-
-    def judge(
-        self,
-        exchanges: Sequence[Exchange],
-        greeting: Greeting,
-        method: str,
-        *,
-        cause_search: CauseSearch | None = None,
-    ) -> TaskReport:
-        """Judge answers by laws, the reference and the declaration; name the faults."""
-
-
-DISCIPLINES: Mapping[str, Discipline] = {
-    "forward_kinematics": forward_kinematics,
-    "inverse_kinematics": inverse_kinematics,
-    "track": track,
-    "resample": resample,
-    "mass_spring_forces": forces,
-    "energy": energy,
-    "mass_spring_step": Stepping("mass_spring_step"),
-    "mass_spring_motion": Stepping("mass_spring_motion"),
-    "robot_jacobian": robot_jacobian,
-    "robot_velocity": robot_velocity,
-    "robot_inverse_kinematics": robot_inverse_kinematics,
-    "robot_track": robot_track,
-}
+# What is found out about answers beside laws, in this order.
+EXAMINERS: Sequence[Examiner] = (precision.examine, inference.examine, kept_state.examine)
 
 
 def verify(
@@ -101,7 +60,7 @@ def verify(
     for task, method in pairs:
         attempt = Attempt(contestant, task, method, seed, thorough, notify)
         try:
-            reports.append(attempt.judge(reports))
+            reports.append(attempt.examine())
             attempts.append(attempt)
         except NoGreetingError:
             raise
@@ -136,13 +95,6 @@ def _unfinished(count: int, total: int) -> Sentence:
     )
 
 
-class Answers(NamedTuple):
-    """The exchanges of a solver with the judge, and the cases that they are of."""
-
-    cases: Sequence[Case]
-    exchanges: Sequence[Exchange]  # fewer than the cases if too many hang
-
-
 class Attempt:
     """A solver at a task: it is asked and judged, then its wrong answers are explained."""
 
@@ -155,38 +107,49 @@ class Attempt:
         thorough: bool,
         notify: Notify,
     ) -> None:
-        self.task, self._contestant, self._method = task, contestant, method
+        self.task, self.contestant, self._method = task, contestant, method
         self._seed, self._thorough, self._notify = seed, thorough, notify
-        self._answers: dict[str, Answers] = {}  # by the greeting that the cases suit
-        self._inference = Inference(())
+        self._answers: dict[str, Sequence[Exchange]] = {}  # by the greeting that the cases suit
+        self._unsent: Sentence | None = None
 
-    def _answers_to(self, greeting: Greeting) -> Answers:
+    def _ask(self, greeting: Greeting) -> Sequence[Exchange]:
         """Return the answers to the cases that suit a greeting, which are asked once."""
         key = repr(greeting)
         if key not in self._answers:
-            discipline = DISCIPLINES[self.task]
-            cases = discipline.cases(greeting, self._method, self._seed, self._thorough)
-            exchanges = _ask(self._contestant, cases, self._notify)
-            self._answers[key] = Answers(cases, exchanges)
+            cases = DISCIPLINES[self.task].cases(greeting, self._method, self._seed, self._thorough)
+            self._answers[key] = self.ask(cases)
         return self._answers[key]
 
-    def judge(self, reports: Sequence[TaskReport]) -> TaskReport:
-        """Return the report with the verdict by laws and honest methods alone.
+    def ask(self, cases: Sequence[Case]) -> Sequence[Exchange]:
+        """Return the answers to some cases."""
+        exchanges = _ask(self.contestant, cases, self._notify)
+        if unsent := len(cases) - len(exchanges):
+            self._unsent = _unsent(unsent, len(cases))
+        return exchanges
 
-        `reports` are those on earlier tasks.
-        """
-        greeting, causes = self._contestant.greeting, self._causes(reports)
-        judge = partial(self._judged, NoSearch(), _known_faults(self.task, reports, causes))
-        report = judge(greeting)
-        self._inference = infer(self._contestant, report, judge)
-        return inferred(report, greeting, self._inference, judge)
+    def judge(self, greeting: Greeting, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
+        """Judge answers by a greeting: those given, or else to the cases that suit it."""
+        exchanges = self._ask(greeting) if exchanges is None else exchanges
+        self._notify(sentence("judging {task}", task=self.task), 0, None)
+        greeting, reason = precision.judging_greeting(exchanges, greeting)
+        report = DISCIPLINES[self.task].judge(exchanges, greeting, self._method)
+        reasons = (reason,) if reason else ()
+        report = replace(report, assumptions=reasons, exchanges=exchanges, greeting=greeting)
+        return self._with_unsent(report)
+
+    def examine(self, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
+        """Return the report with the verdict, by laws, honest programs and examiners alone."""
+        report = self.judge(self.contestant.greeting, exchanges)
+        for examiner in EXAMINERS if exchanges is None else (precision.examine,):
+            report = examiner(self, report)
+        return report
 
     def explain(
         self, verdict: TaskReport, reports: Sequence[TaskReport], cause_search: CauseSearch
     ) -> TaskReport:
         """Return the report on a verdict with the cause of wrong answers, if one is found in time.
 
-        `reports` are those on earlier tasks.
+        `reports` are those on earlier tasks. The verdict stays.
         """
         if verdict.verdict is Verdict.RIGHT and self.task != inverse_kinematics.TASK:
             return verdict
@@ -196,53 +159,91 @@ class Attempt:
             seconds=SECONDS,
         )
         self._notify(work, 0, None)
-        return _explained(partial(self._explain, reports, cause_search), verdict, cause_search)
 
-    def _explain(self, reports: Sequence[TaskReport], cause_search: CauseSearch) -> TaskReport:
-        causes, greeting = self._causes(reports), self._contestant.greeting
-        judge = partial(self._judged, cause_search, _known_faults(self.task, reports, causes))
-        report = inferred(judge(greeting), greeting, self._inference, judge)
-        find_state = partial(with_kept_state, self._contestant, report)
-        report = cause_search.run(find_state, report)
-        if not causes:
-            find_line = partial(with_changed_line, report, greeting)
-            report = cause_search.run(find_line, report)
-        return _with_cause(report, causes)
+        def find_in_time() -> TaskReport:
+            with cause_search.limited():
+                return self._explained(verdict, reports, cause_search)
 
-    def _causes(self, reports: Sequence[TaskReport]) -> list[TaskReport]:
-        """Return the reports on wrong answers of what the task builds upon, explained first."""
+        report = self._with_unsent(cause_search.run(find_in_time, verdict))
+        if cause_search.end is None or report.verdict <= Verdict.RIGHT_EXCEPT:
+            return report
+        return _with_hint(report, cause_search.end)
+
+    def _explained(
+        self, verdict: TaskReport, reports: Sequence[TaskReport], search: CauseSearch
+    ) -> TaskReport:
         causes = [report for report in reports if _builds_on(self.task, self._method, report)]
         order = BUILDS_ON.get(self.task, ())
-        return sorted(causes, key=lambda r: (not r.diagnosis.explained, order.index(r.task)))
+        causes.sort(key=lambda r: (not r.diagnosis.explained, order.index(r.task)))
+        diagnose = partial(self._diagnosis, search, _known_faults(self.task, reports, causes))
+        report = search.run(lambda: _with_diagnosis(verdict, diagnose), verdict)
+        if not causes and report.greeting is not None:
+            find_line = partial(with_changed_line, report, report.greeting)
+            report = search.run(find_line, report)
+        return _with_cause(report, causes)
 
-    def _judged(
+    def _diagnosis(
         self,
-        cause_search: CauseSearch,
-        known_faults: Sequence[SwitchFault | str] | None,
-        greeting: Greeting,
-    ) -> TaskReport:
-        answers = self._answers_to(greeting)
-        if not cause_search.is_on:
-            self._notify(sentence("judging {task}", task=self.task), 0, None)
-        return _judge_answers(
-            answers, self.task, self._method, greeting, known_faults, cause_search
-        )
+        search: CauseSearch,
+        base: Sequence[SwitchFault | str] | None,
+        report: TaskReport,
+    ) -> Diagnosis:
+        """Return why answers are wrong, in the precision that they are judged by or in single."""
+        greeting = report.greeting or self.contestant.greeting
+        find = DISCIPLINES[self.task].diagnose
+        diagnosis = find(JudgedAnswers(report, greeting, search, base))
+        is_wrong = report.verdict is Verdict.WRONG and not diagnosis.explained
+        if is_wrong and greeting.precision == "double" and precision.has_double(report):
+            single = msgspec.structs.replace(greeting, precision="single")
+            inexact = find(JudgedAnswers(report, single, search, base))
+            diagnosis = inexact if inexact.explained else diagnosis
+        return diagnosis
+
+    def _with_unsent(self, report: TaskReport) -> TaskReport:
+        unsent, hints = self._unsent, report.diagnosis.hints
+        if unsent is None or unsent in hints:
+            return report
+        return replace(report, diagnosis=replace(report.diagnosis, hints=(*hints, unsent)))
 
 
-def _explained(
-    find: Callable[[], TaskReport], verdict: TaskReport, cause_search: CauseSearch
-) -> TaskReport:
-    """Return the report with a cause, or that on the verdict and why the search ended early."""
+def _with_hint(report: TaskReport, hint: Sentence) -> TaskReport:
+    """Return a report with one more hint, the first."""
+    diagnosis = report.diagnosis
+    return replace(report, diagnosis=replace(diagnosis, hints=(hint, *diagnosis.hints)))
 
-    def find_in_time() -> TaskReport:
-        with cause_search.limited():
-            return find()
 
-    report = cause_search.run(find_in_time, verdict)
-    if cause_search.end is None or report.verdict <= Verdict.RIGHT_EXCEPT:
+def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnosis]) -> TaskReport:
+    """Return a report with its diagnosis; what examiners have found comes first.
+
+    A solver that is judged by what it takes may have a mistake in what it does not take.
+    """
+    before = report.diagnosis
+    if before.is_certain:
         return report
-    hints = (cause_search.end, *report.diagnosis.hints)
-    return replace(report, diagnosis=replace(report.diagnosis, hints=hints))
+    diagnosis, original = diagnose(report), report.original
+    if original is not None and not diagnosis.explained:
+        explanations = diagnose(original).explanations
+        if report.verdict <= Verdict.UNDECIDED:
+            explanations = tuple(map(_unless_meant, filter(_is_of_inputs, explanations)))
+        diagnosis = replace(diagnosis, explanations=explanations)
+    explanations = (*before.explanations, *diagnosis.explanations)
+    diagnosis = replace(diagnosis, explanations=explanations)
+    judgements = [
+        replace(j, expected=j.expected or diagnosis.expected.get(j.case.name, {}))
+        for j in report.judgements
+    ]
+    return replace(report, judgements=judgements, diagnosis=diagnosis)
+
+
+def _is_of_inputs(explanation: Explanation) -> bool:
+    """Return whether a mistake is no false claim, which is right where the restriction is meant."""
+    return not {code.split("-")[1] for code in explanation.codes} <= {"CLAIM"}
+
+
+def _unless_meant(explanation: Explanation) -> Explanation:
+    """Return the explanation of answers that are right if a restriction is meant."""
+    words = sentence("If that is not meant: {what}", what=explanation.sentence)
+    return replace(explanation, sentence=words)
 
 
 def _known_faults(
@@ -308,7 +309,9 @@ def _with_methods(
     task = next((task for task in WITH_METHODS if task in (tasks or greeting.tasks)), None)
     if task is None or task not in greeting.tasks:
         return greeting, ()
-    methods = methods_of(contestant, DISCIPLINES[task].cases(greeting, "", seed, False)[2:3])
+    methods = inference.methods_of(
+        contestant, DISCIPLINES[task].cases(greeting, "", seed, False)[2:3]
+    )
     if methods == greeting.methods:
         return greeting, ()
     remark = sentence(
@@ -329,52 +332,9 @@ def judge_cases(
 
     The arguments are those of `verify`.
     """
-    answers = Answers(cases, _ask(contestant, cases, notify))
-    judge = partial(_judge_answers, answers, task, method, contestant.greeting, None)
-    cause_search = CauseSearch()
-    return _explained(partial(judge, cause_search), judge(NoSearch()), cause_search)
-
-
-def _judge_answers(
-    answers: Answers,
-    task: str,
-    method: str,
-    greeting: Greeting,
-    known_faults: Sequence[SwitchFault | str] | None,
-    cause_search: CauseSearch,
-) -> TaskReport:
-    """Judge answers by what a greeting declares.
-
-    What the task builds upon is known to have some faults; None if it is right, or they are not
-    known.
-    """
-    exchanges, total = answers.exchanges, len(answers.cases)
-    judge: Callable[..., TaskReport] = partial(DISCIPLINES[task].judge, cause_search=cause_search)
-    if known_faults is not None:
-        judge = partial(judge, base=known_faults)
-    greeting, reason = precision.judging_greeting(exchanges, greeting)
-    report = judge(exchanges, greeting, method)
-    places = precision.decimal_places(exchanges) if report.verdict is Verdict.WRONG else None
-    if places is not None:
-        words = sentence(
-            "All numbers of its answers are rounded to {places} decimals. Return all digits.",
-            places=places,
-        )
-        report = replace(report, diagnosis=Diagnosis(first_broken=words))
-    diagnosis = report.diagnosis
-    unexplained = report.verdict is Verdict.WRONG and not diagnosis.explained and places is None
-    is_double = diagnosis.is_double or precision.is_exact(report)
-    if unexplained and greeting.precision == "double" and not is_double:
-        single = judge(exchanges, msgspec.structs.replace(greeting, precision="single"), method)
-        is_right = single.verdict <= Verdict.RIGHT_EXCEPT
-        if not is_right and single.diagnosis.explained and precision.has_double(report):
-            report = replace(report, diagnosis=single.diagnosis)
-        elif precision.is_off_by_single(report) if is_right else single.diagnosis.explained:
-            report, reason = single, precision.INEXACT
-    if unsent := total - len(exchanges):
-        hints = (*report.diagnosis.hints, _unsent(unsent, total))
-        report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
-    return replace(report, assumptions=(reason,) if reason else ())
+    attempt = Attempt(contestant, task, method, 0, False, notify)
+    verdict = attempt.examine(attempt.ask(cases))
+    return attempt.explain(verdict, (), CauseSearch())
 
 
 def _unsent(count: int, total: int) -> Sentence:

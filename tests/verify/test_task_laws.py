@@ -38,7 +38,7 @@ from plumbob.verify.kinematics.switches import Switches
 from plumbob.verify.laws import HOLDS, equal_answers
 from plumbob.verify.mass_spring import energy, forces
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.precision import AS_SINGLE, is_off_by_single, judging_greeting
+from plumbob.verify.precision import AS_SINGLE, are_off_by_single, judging_greeting
 
 EPSILON = 2.0**-52
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
@@ -370,7 +370,7 @@ def test_errors_of_five_to_nine_digits_are_those_of_single_precision(digits, is_
     """The least decides where a fault is small in most cases, the median where it is in few."""
     judgements = [judgement(1, WRONG, count) for count in (*digits, None)]
     report = TaskReport("", "", judgements, Diagnosis())
-    assert is_off_by_single(report) is is_single
+    assert are_off_by_single(report.judgements) is is_single
     assert report.digits == min(digits, default=None)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 from plumbob.verify import cause_search
 from plumbob.verify.cause_search import CauseSearch, NoSearch, SearchLimit
+from plumbob.verify.disciplines import DISCIPLINES
 from plumbob.verify.door.question import Question
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
@@ -26,7 +27,6 @@ def mass_spring_forces(masses, gravity, **_):
 # The stages of a search: by name, the module that calls each.
 STAGES = {
     "explain": "plumbob.verify.mass_spring.force_diagnosis",
-    "with_kept_state": "plumbob.verify.verify",
     "with_changed_line": "plumbob.verify.verify",
     "_with_cause": "plumbob.verify.verify",
 }
@@ -89,7 +89,7 @@ def test_a_killed_search_leaves_the_verdict_in_all_files(tmp_path):
     done = run(
         "import importlib, os\n"
         "module = importlib.import_module('plumbob.verify.verify')\n"
-        "module.with_kept_state = lambda *_: os._exit(9)\n"
+        "module.with_changed_line = lambda *_: os._exit(9)\n"
         "from plumbob.cli.main import main\n"
         "main(['verify', 'mine.py', '-o', 'out'])",
         tmp_path,
@@ -104,8 +104,7 @@ def test_a_killed_search_leaves_the_verdict_in_all_files(tmp_path):
 
 def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_path, capsys):
     functions = {"energy": lambda **_: {"total": 1.0}, "mass_spring_forces": wrong_forces}
-    module = importlib.import_module("plumbob.verify.mass_spring.energy")
-    monkeypatch.setattr(module, "judge", fails)
+    monkeypatch.setitem(DISCIPLINES, "energy", DISCIPLINES["energy"]._replace(judge=fails))
     context = Presentation(speaker("en"), "en", ("mine.py",))
 
     def code_of(*tasks):
@@ -137,14 +136,14 @@ def test_a_pipe_gets_a_line_while_nothing_else_is_printed(tmp_path):
         "import time\n"
         "from plumbob.cli import verify\n"
         "from plumbob.verify import cause_search\n"
-        "from plumbob.verify.mass_spring import forces\n"
+        "from plumbob.verify.disciplines import DISCIPLINES\n"
         "verify.LINE_PAUSE = 0.4\n"
         "cause_search.SECONDS = 1.0\n"
-        "judge = forces.judge\n"
+        "forces = DISCIPLINES['mass_spring_forces']\n"
         "def slow(*arguments, **options):\n"
         "    time.sleep(1.2)\n"
-        "    return judge(*arguments, **options)\n"
-        "forces.judge = slow\n"
+        "    return forces.judge(*arguments, **options)\n"
+        "DISCIPLINES['mass_spring_forces'] = forces._replace(judge=slow)\n"
         "from plumbob.cli.main import main\n"
         "main(['verify', 'mine.py'])",
         tmp_path,

@@ -8,9 +8,10 @@ import msgspec
 
 from .. import message
 from ..case import Case
+from ..disciplines import DISCIPLINES
 from ..greeting import Greeting
 from ..task import TASKS, Task
-from ..verify import DISCIPLINES, trials
+from ..verify import trials
 from .files import GREETING, REQUEST, SETTINGS, place_of, read_greeting
 from .tables import write_table
 

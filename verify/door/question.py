@@ -8,8 +8,9 @@ from typing import NamedTuple
 from plumbob.text.sentence import Say, sentence
 
 from ..contestant import Contestant
+from ..disciplines import DISCIPLINES
 from ..judgement import Report
-from ..verify import DISCIPLINES, Notify, judge_cases, verify
+from ..verify import Notify, judge_cases, verify
 from . import LIMITS, ProcessLimits, open_contestant, saved
 from .files import FileContestant
 

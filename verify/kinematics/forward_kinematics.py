@@ -11,14 +11,14 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case, not_finite, of_joints
 from . import rounding, skeletons
 from .pose_laws import unit_quaternions
-from .report import diagnosis_of, report
+from .report import diagnosis_of, report, with_hints
 from .skeletons import CaseFamily, drawn
 
 TASK = "forward_kinematics"
@@ -42,18 +42,18 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Compare positions and rotations separately with the reference; name the faults."""
+    """Compare positions and rotations separately with the reference."""
     judgements = [_judge(exchange, greeting) for exchange in exchanges]
-    wrong = [
-        exchange
-        for exchange, judgement in zip(exchanges, judgements, strict=True)
-        if judgement.verdict > Verdict.RIGHT_EXCEPT
-    ]
-    find_faults = partial(_diagnosis, exchanges, wrong, greeting)
-    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
-    return report(TASK, method, judgements, diagnosis)
+    return report(TASK, method, judgements)
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the poses, if some are wrong."""
+    pairs = zip(judged.exchanges, judged.report.judgements, strict=True)
+    wrong = [exchange for exchange, j in pairs if j.verdict > Verdict.RIGHT_EXCEPT]
+    diagnosis = _diagnosis(judged.exchanges, wrong, judged.greeting)
+    return with_hints(judged.report.judgements, diagnosis)
 
 
 def _diagnosis(

@@ -13,7 +13,7 @@ from plumbob.reference.skeleton import Skeleton
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange, Failure, FailureKind
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
@@ -32,12 +32,11 @@ from . import (
 from .faults import SwitchFault
 from .pose_laws import AnsweredPose
 from .predictions import solve
-from .report import diagnosis_of, report
+from .report import diagnosis_of, report, with_hints
 from .sweeps import PoseTrial, SweepComparison
 
 TASK = "inverse_kinematics"
 STOPS, SLOW, ENDED = "sweeps made", "target reached, slow", "target reached, ended"
-OF_A_MISTAKE = "one sweep, of a mistake"
 # The methods of the textbook.
 METHODS = ("ccd", "fabrik")
 MAX_FAULTS = 3
@@ -64,48 +63,37 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     return [*problems.cases(*arguments), *limits.cases(*arguments)]
 
 
-def judge(
-    exchanges: Sequence[Exchange],
-    greeting: Greeting,
-    method: str,
-    base: Sequence[SwitchFault] = (),
-    cause_search: CauseSearch | None = None,
-) -> TaskReport:
-    """Judge poses by the laws, and sweeps by the textbook's; name the faults.
+def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+    """Judge poses by the laws, and sweeps by the textbook's and by those of honest programs."""
+    limited, unlimited = split(exchanges)
+    trials, comparison = judged_trials(unlimited, greeting, method)
+    judgements = [trial.judgement for trial in trials]
+    limited_judgements, _ = limits.judge(limited, greeting, is_sound(judgements))
+    behaviour = comparison.damped or comparison.behaviour
+    return report(TASK, method, [*judgements, *limited_judgements], behaviour)
 
-    `base` are the faults that the solver's forward kinematics is known to have.
-    """
+
+def split(exchanges: Sequence[Exchange]) -> tuple[list[Exchange], list[Exchange]]:
+    """Return the exchanges with limits, and those without."""
     limited = [exchange for exchange in exchanges if "cones" in exchange.case.inputs]
-    unlimited = [exchange for exchange in exchanges if exchange not in limited]
-    search = cause_search or CauseSearch()
-    judgements, diagnosis = _judge_unlimited(unlimited, greeting, method, base, search)
-    is_sound = all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
-    limited_judgements, readings = limits.judge(limited, greeting, is_sound)
-    # what is wrong without limits is so with them
-    explanations = (*diagnosis.explanations, *(readings.explanations if is_sound else ()))
-    count = diagnosis.variant_count + readings.variant_count
-    diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
-    return report(TASK, method, [*judgements, *limited_judgements], diagnosis)
+    return limited, [exchange for exchange in exchanges if exchange not in limited]
 
 
-def _judge_unlimited(
-    exchanges: Sequence[Exchange],
-    greeting: Greeting,
-    method: str,
-    base: Sequence[SwitchFault],
-    cause_search: CauseSearch,
-) -> tuple[list[CaseJudgement], Diagnosis]:
-    """Return the judgements of answers to requests without limits, and the faults.
+def is_sound(judgements: Sequence[CaseJudgement]) -> bool:
+    """Return whether no answer is wrong."""
+    return all(judgement.verdict <= Verdict.RIGHT_EXCEPT for judgement in judgements)
 
-    Whether sweeps are an honest solver's or a mistake's is a part of the verdict.
-    """
+
+def judged_trials(
+    exchanges: Sequence[Exchange], greeting: Greeting, method: str
+) -> tuple[list[PoseTrial], SweepComparison]:
+    """Return the answers to requests without limits, judged, and how their sweeps compare."""
     declared = method.lower() if method.lower() in METHODS else ""
     trials = [PoseTrial(exchange) for exchange in exchanges]
     sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
-    idle = sweeps.idle(trials)
     textbook = declared
-    if not method and not idle:
-        textbook = sweeps.recognise_method(sweep_trials, greeting, base)
+    if not method and not sweeps.idle(trials):
+        textbook = sweeps.recognise_method(sweep_trials, greeting)
     for trial in trials:
         trial.judgement = _judge(trial, textbook, greeting)
     others_hold = not any(trial.is_wrong for trial in trials)
@@ -118,22 +106,42 @@ def _judge_unlimited(
         original = by_name.get(trial.case.facts.get("like", ""))
         if original and trial.pose.finite and original.pose.finite:
             trial.add([_equal_worlds(trial, original, comparison, greeting)])
-    # what repeats its start is explained by chance by several faults at once
-    find_faults = partial(_diagnosis, trials, comparison, greeting, 1 if idle else MAX_FAULTS, base)
-    diagnosis = Diagnosis(behaviour=comparison.behaviour)
-    diagnosis = find_faults() if comparison.honest else cause_search.run(find_faults, diagnosis)
+    return trials, comparison
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the poses, or the sweeps of poses that are right."""
+    limited, unlimited = split(judged.exchanges)
+    greeting, method = judged.greeting, judged.report.method
+    trials, comparison = judged_trials(unlimited, greeting, method)
+    base = judged.base or ()
+    if not method and not comparison.method and not sweeps.idle(trials):
+        comparison = _suspicion(trials, greeting, base)
+    diagnosis = _diagnosis(trials, comparison, greeting, base)
     diagnosis = _with_hints(diagnosis, trials, comparison, greeting)
-    if comparison.honest and sweeps.is_grave(comparison.method, diagnosis):
-        for trial in trials:
-            trial.correct(_aggravate)
     judgements = [trial.judgement for trial in trials]
     answers = [
         claims.values_of(trial.case, [trial.pose], trial.outputs, comparison.method, greeting)
         for trial in trials
         if trial.pose.finite
     ]
-    name_claims = partial(claims.with_claims, diagnosis, judgements, answers, not base)
-    return judgements, cause_search.run(name_claims, diagnosis)
+    diagnosis = claims.with_claims(diagnosis, judgements, answers, not base)
+    if is_sound(judgements):  # what is wrong without limits is so with them
+        _, readings = limits.judge(limited, greeting, True)
+        explanations = (*diagnosis.explanations, *readings.explanations)
+        count = diagnosis.variant_count + readings.variant_count
+        diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
+    return with_hints(judged.report.judgements, diagnosis)
+
+
+def _suspicion(
+    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault]
+) -> SweepComparison:
+    """Return how sweeps compare with those of the method that they resemble with a fault."""
+    sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
+    method = sweeps.suspected_method(sweep_trials, greeting, base)
+    others_hold = not any(trial.is_wrong for trial in trials)
+    return sweeps.compare(sweep_trials, method, "", others_hold, greeting)
 
 
 def _with_hints(
@@ -162,12 +170,6 @@ def _forgive(case: Case, broken: Finding) -> Finding:
         return broken
     reach = case.facts["reach"]
     return finding(SLOW, broken.error, broken.tolerance, law=broken.law, reach=reach)
-
-
-def _aggravate(broken: Finding) -> Finding:
-    """Return a forgiven sweep as a wrong one: a fault reproduces it."""
-    is_forgiven = broken.law == sweeps.LAW and broken.verdict is Verdict.RIGHT_EXCEPT
-    return replace(broken, verdict=Verdict.WRONG) if is_forgiven else broken
 
 
 def _judge(trial: PoseTrial, method: str, greeting: Greeting) -> CaseJudgement:
@@ -321,13 +323,14 @@ def _diagnosis(
     trials: Sequence[PoseTrial],
     comparison: SweepComparison,
     greeting: Greeting,
-    max_faults: int,
     base: Sequence[SwitchFault],
 ) -> Diagnosis:
     """Return the faults that reproduce the answers, of the method or of a Jacobian's steps."""
     posed_trials = [trial for trial in trials if trial.pose.outputs]
     sweep_trials = [trial for trial in posed_trials if trial.is_sweep]
     names = comparison.wrong
+    # what repeats its start is explained by chance by several faults at once
+    max_faults = 1 if sweeps.idle(trials) else MAX_FAULTS
     wrong = [trial for trial in sweep_trials if trial.is_wrong or trial.case.name in names]
     must = [t for t in posed_trials if t.case.requirement == "must" and t.pose.finite]
     diagnosis = Diagnosis(behaviour=comparison.behaviour)
@@ -351,8 +354,6 @@ def _diagnosis(
     is_right = all(trial.judgement.verdict is Verdict.RIGHT for trial in trials)
     if not (comparison.method or diagnosis.explained):
         steps = jacobian_steps.explanations(trials, greeting, base, is_right)
-        for trial in sweep_trials if is_right and steps else ():
-            trial.add([finding(OF_A_MISTAKE, 1.0)])
         steps = steps if steps or is_right else early_ends.by_squares(trials)
         return replace(diagnosis, explanations=steps or diagnosis.explanations)
     return diagnosis

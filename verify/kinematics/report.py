@@ -76,11 +76,17 @@ def _adds(explanation: Explanation, base: Sequence[SwitchFault]) -> bool:
 
 
 def report(
-    task: str, method: str, judgements: Sequence[CaseJudgement], diagnosis: Diagnosis
+    task: str, method: str, judgements: Sequence[CaseJudgement], behaviour: Sentence | None = None
 ) -> TaskReport:
-    """Return the report, with hints and the first broken law where no fault explains answers."""
+    """Return the report on answers of which no cause is sought yet."""
     if not any(map(_has_numbers, judgements)):
         judgements = list(map(_as_broken, judgements))
+    diagnosis = with_hints(judgements, Diagnosis(behaviour=behaviour))
+    return TaskReport(task, method, judgements, diagnosis)
+
+
+def with_hints(judgements: Sequence[CaseJudgement], diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis with hints, and the first broken law where no fault explains answers."""
     failures = smallest_failures(judgements, diagnosis.explained)
     broken = None
     if len(failures) == 1 and not diagnosis.explained:
@@ -90,8 +96,7 @@ def report(
         hints += proportion_of(judgements)
     if max((judgement.verdict for judgement in judgements), default=0) == Verdict.UNDECIDED:
         hints += (laws_that_hold(judgements),)
-    diagnosis = replace(diagnosis, first_broken=broken, hints=hints)
-    return TaskReport(task, method, judgements, diagnosis)
+    return replace(diagnosis, first_broken=broken, hints=hints)
 
 
 def _has_numbers(judgement: CaseJudgement) -> bool:

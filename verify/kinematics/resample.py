@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..explain import Variant, explain
 from ..greeting import Greeting
@@ -20,7 +20,7 @@ from ..laws import finding, judge_case
 from . import rounding
 from .faults import AS_THE_TEXTBOOK, sentences_of
 from .polylines import Polyline
-from .report import report
+from .report import report, with_hints
 from .resample_faults import FAULTS, even_points
 from .skeletons import generator
 
@@ -90,7 +90,6 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Judge points by the laws of resampling; strokes may be bridged or not."""
     judgements = [
@@ -101,15 +100,19 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    pairs = zip(exchanges, judgements, strict=True)
+    return report(TASK, method, judgements, _behaviour_at_strokes(exchanges, greeting))
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the points, if some are wrong."""
+    judgements, behaviour = judged.report.judgements, judged.report.diagnosis.behaviour
+    pairs = zip(judged.exchanges, judgements, strict=True)
     wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
-    behaviour = _behaviour_at_strokes(exchanges, greeting)
     diagnosis = Diagnosis(behaviour=behaviour)
     if any(judgement.verdict and isinstance(judgement.answer, Answer) for judgement in judgements):
         ordered = [exchange for exchange, _ in wrong_first]
-        find_faults = partial(_diagnosis, ordered, greeting, behaviour)
-        diagnosis = (cause_search or CauseSearch()).run(find_faults, diagnosis)
-    return report(TASK, method, judgements, diagnosis)
+        diagnosis = _diagnosis(ordered, judged.greeting, behaviour)
+    return with_hints(judgements, diagnosis)
 
 
 def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> Sentence | None:

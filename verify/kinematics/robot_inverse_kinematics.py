@@ -14,14 +14,14 @@ from plumbob.reference.judging import PoseJudgement
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import motion_faults, robot_targets, rounding
 from .motion_faults import is_falling_at
-from .report import report
+from .report import report, with_hints
 from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
 from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, FEW, MOST, UNREACHED
 from .trajectories import Trajectory, trajectories
@@ -40,31 +40,31 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    base: Sequence[str] | None = None,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Judge coordinates by the laws of poses; name the faults, likely those of its Jacobian.
-
-    `base` are these, None if the Jacobian is right.
-    """
+    """Judge coordinates by the laws of poses."""
     fails_at_zero = _fails_at_zero(exchanges)
     motions = trajectories(exchanges, trajectory_of)
     judgements = [
         judge_case(
             exchange,
-            partial(_findings, exchange.case, motions, greeting, fails_at_zero,
-                    has_right_jacobian=base is None),
+            partial(_findings, exchange.case, motions, greeting, fails_at_zero),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
             robot_targets.timed_solve(exchange.case.inputs),
         )
         for exchange in exchanges
     ]  # fmt: skip
-    find_faults = partial(_diagnosis, judgements, motions, base)
-    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
-    if not diagnosis.explained and _ignores_start(motions.values()):
-        words = sentence("Its answers do not depend on start.")
-        diagnosis = replace(diagnosis, behaviour=words)
-    return report(TASK, method, judgements, diagnosis)
+    words = sentence("Its answers do not depend on start.")
+    return report(TASK, method, judgements, words if _ignores_start(motions.values()) else None)
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the coordinates, likely those of the Jacobian."""
+    judgements = judged.report.judgements
+    motions = trajectories(judged.exchanges, trajectory_of)
+    diagnosis = _diagnosis(judgements, motions, judged.base)
+    if not diagnosis.explained:
+        diagnosis = replace(diagnosis, behaviour=judged.report.diagnosis.behaviour)
+    return with_hints(judgements, diagnosis)
 
 
 def _diagnosis(
@@ -149,7 +149,6 @@ def _findings(
     greeting: Greeting,
     fails_at_zero: bool,
     outputs: Mapping[str, Any],
-    has_right_jacobian: bool = True,
 ) -> list[Finding]:
     q = outputs.get("q")
     if q is None:
@@ -158,7 +157,7 @@ def _findings(
         return [not_finite("numbers, of a joint", q)]
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
-    stays = not has_right_jacobian or any(law.verdict for motion in motions.values()
+    stays = any(law.verdict for motion in motions.values()
                 for law in motion_faults.limit_laws(motion, motions.values()))  # fmt: skip
     laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero, stays)]
     if case.family == AT_A_LIMIT:

@@ -12,14 +12,14 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints
 from . import robot_models, rounding
 from .formulas import evaluate
-from .report import report
+from .report import report, with_hints
 from .robot_faults import FAULTS as POSE_FAULTS
 from .robot_faults import JACOBIAN_FAULTS, RobotFault
 from .robot_models import mechanism, tool_pose
@@ -103,22 +103,9 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
     """Compare Jacobians with the reference in the convention that suits them; name the faults."""
-    answered = [
-        exchange
-        for exchange in exchanges
-        if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values
-    ]
-    matches = {
-        name: [
-            _matches(exchange, greeting, right_jacobian(exchange.case.inputs, convention))
-            for exchange in answered
-        ]
-        for name, convention in CONVENTIONS.items()
-    }
-    name = max(matches, key=lambda name: sum(matches[name]))
+    name, matches = _convention(exchanges, greeting)
     judgements = []
     for exchange in exchanges:
         J = right_jacobian(exchange.case.inputs, CONVENTIONS[name])
@@ -126,19 +113,44 @@ def judge(
         inputs = exchange.case.inputs
         reference = partial(jacobian, mechanism(inputs), inputs["q"], -1)
         allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
-        count = digits(_gap(exchange, J), 1.0) if exchange in answered else None
+        count = digits(_gap(exchange, J), 1.0) if exchange.case.name in matches else None
         judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}, count))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-    failures = [exchange for exchange, is_right in zip(answered, matches[name], strict=True)
-              if not is_right]  # fmt: skip
-    rest = [exchange for exchange in answered if exchange not in failures]
-    find_faults = partial(_diagnosis, failures, rest, greeting)
-    search = cause_search or CauseSearch()
-    diagnosis = search.run(find_faults, Diagnosis()) if wrong else Diagnosis()
-    if not wrong and answered:
-        words = sentence("The Jacobian's convention: {convention}.", convention=name)
-        diagnosis = Diagnosis(behaviour=words)
-    return report(TASK, method, judgements, diagnosis)
+    words = sentence("The Jacobian's convention: {convention}.", convention=name)
+    return report(TASK, method, judgements, words if matches and not wrong else None)
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the Jacobians, if some are wrong."""
+    judgements, diagnosis = judged.report.judgements, Diagnosis()
+    if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
+        _, matches = _convention(judged.exchanges, judged.greeting)
+        wrong, right = (
+            [exchange for exchange in judged.exchanges if matches.get(exchange.case.name) is value]
+            for value in (False, True)
+        )
+        diagnosis = _diagnosis(wrong, right, judged.greeting)
+    return with_hints(judgements, diagnosis)
+
+
+def _convention(exchanges: Sequence[Exchange], greeting: Greeting) -> tuple[str, dict[str, bool]]:
+    """Return the convention that suits most answers, and by case whether it suits."""
+    answered = [
+        exchange
+        for exchange in exchanges
+        if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values
+    ]
+    matches = {
+        name: {
+            exchange.case.name: _matches(
+                exchange, greeting, right_jacobian(exchange.case.inputs, convention)
+            )
+            for exchange in answered
+        }
+        for name, convention in CONVENTIONS.items()
+    }
+    name = max(matches, key=lambda name: sum(matches[name].values()))
+    return name, matches[name]
 
 
 def _bound(case: Case, greeting: Greeting) -> float:

@@ -11,13 +11,13 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Exchange
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import motion_faults, robot_motions, rounding
-from .report import report
+from .report import report, with_hints
 from .robot_models import FARTHEST
 from .robot_targets import TOLERANCE
 from .trajectories import LENIENT, Trajectory, trajectories
@@ -58,13 +58,8 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    base: Sequence[str] | None = None,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Judge motions by the laws of tracking; name the faults, likely those of its Jacobian.
-
-    `base` are these, None if the Jacobian is right.
-    """
+    """Judge motions by the laws of tracking."""
     motions = trajectories(exchanges, _trajectory_of)
     judgements = [
         judge_case(
@@ -74,12 +69,18 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    find_faults = partial(motion_faults.diagnosis_of, judgements, motions, base)
-    diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
+    return report(TASK, method, judgements)
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the motions, likely those of the Jacobian."""
+    judgements = judged.report.judgements
+    motions = trajectories(judged.exchanges, _trajectory_of)
+    diagnosis = motion_faults.diagnosis_of(judgements, motions, judged.base)
     if not diagnosis.explanations and (keys := _too_fast(motions)):
         explanation = Explanation(keys, motion_faults.SENTENCES[keys[0]], 1.0, 0.0)
         diagnosis = replace(diagnosis, explanations=(explanation,))
-    return report(TASK, method, judgements, diagnosis)
+    return with_hints(judgements, diagnosis)
 
 
 def _too_fast(motions: Mapping[str, Trajectory]) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange, Failure
 from ..explain import Variant, either, explain
 from ..greeting import Greeting
@@ -23,7 +23,7 @@ from ..laws import finding, judge_case, not_finite
 from . import robot_jacobian, robot_models, rounding
 from .faults import TABLE, sentences_of
 from .formulas import evaluate
-from .report import report
+from .report import report, with_hints
 from .robot_faults import RIGHT
 from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
 from .robot_models import feature_of, mechanism
@@ -160,20 +160,22 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    base: Sequence[str] | None = None,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Judge speeds by the tool's velocity; name the faults, likely the `base` of its Jacobian."""
+    """Judge speeds by the tool's velocity."""
     judgements = [_judgement(exchange, greeting) for exchange in exchanges]
+    is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+    return report(TASK, method, judgements, None if is_wrong else _behaviour(judgements, greeting))
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain wrong speeds, likely those of the Jacobian."""
+    judgements, base, diagnosis = judged.report.judgements, judged.base, Diagnosis()
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
-        find_faults = partial(_diagnosis, judgements, greeting)
-        diagnosis = (cause_search or CauseSearch()).run(find_faults, Diagnosis())
+        diagnosis = _diagnosis(judgements, judged.greeting)
         likely = [_of_base(e, base or ()) for e in diagnosis.explanations
                   if base is None or e.share == 1.0 or set(e.faults) & set(base)]  # fmt: skip
-        diagnosis = replace(diagnosis, explanations=tuple(likely), is_double=base is not None)
-    else:
-        diagnosis = Diagnosis(behaviour=_behaviour(judgements, greeting))
-    return report(TASK, method, judgements, diagnosis)
+        diagnosis = replace(diagnosis, explanations=tuple(likely))
+    return with_hints(judgements, diagnosis)
 
 
 def _of_base(explanation: Explanation, base: Sequence[str]) -> Explanation:

@@ -158,10 +158,8 @@ def lengths(trials: Sequence[PoseTrial]) -> Sentence | None:
     )
 
 
-def recognise_method(
-    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault] = ()
-) -> str:
-    """Return the method of most of the sweeps, right or with a fault, or ""."""
+def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
+    """Return the method of most of the sweeps, or the one of an honest program, or ""."""
     for method in NAMES:
         errors = [_error(trial, method, greeting) for trial in trials]
         hits = sum(error <= bound for error, bound in errors)
@@ -169,8 +167,18 @@ def recognise_method(
             return method
     if not trials or all(_is_other_solver(trial, greeting) for trial in trials):
         return ""
-    if honest_variant(trials, "ccd", greeting) is None and damping_of(trials, greeting) is not None:
-        return "ccd"
+    for method in NAMES:
+        if honest_variant(trials, method, greeting) is not None:
+            return method
+    return "ccd" if damping_of(trials, greeting) is not None else ""
+
+
+def suspected_method(
+    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault] = ()
+) -> str:
+    """Return the method that most of the sweeps are of with a fault, or ""."""
+    if not trials or all(_is_other_solver(trial, greeting) for trial in trials):
+        return ""
     for count in range(1, RECOGNISED_FAULTS + 1):
         fits = {method: _best_fit(trials, method, greeting, count, base) for method in NAMES}
         best = max(fits, key=lambda method: fits[method])
@@ -330,18 +338,4 @@ def right_points(
             return None
     return sentence(
         "Its points are those of FABRIK: the mistake is in the rotations that it makes of them."
-    )
-
-
-def is_grave(method: str, diagnosis: Diagnosis) -> bool:
-    """Return whether a fault that is never on purpose reproduces every sweep."""
-    faults = by_key(method)
-    return any(
-        explanation.share == 1.0
-        and not any(
-            key not in faults or faults[key].honest
-            for keys in explanation.faults
-            for key in keys.split(" + ")
-        )
-        for explanation in diagnosis.explanations
     )

@@ -15,7 +15,7 @@ from plumbob.reference.tracking import track
 from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..gaps import difference
 from ..greeting import Greeting
@@ -27,7 +27,7 @@ from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, predict_track
 from .problems import TargetProblem
-from .report import diagnosis_of, report
+from .report import diagnosis_of, report, with_hints
 from .skeletons import CaseFamily
 from .switches import Switches
 
@@ -125,31 +125,30 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    base: Sequence[SwitchFault] = (),
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Judge each frame by the laws of poses, and compare it with its neighbours.
+    """Judge each frame by the laws of poses, and compare it with its neighbours."""
+    judgements = [_judge(exchange, method.lower(), greeting) for exchange in exchanges]
+    return report(TASK, method.lower(), judgements)
 
-    `base` are the faults that the solver's inverse kinematics is known to have.
-    """
-    method = method.lower()
-    judgements = [_judge(exchange, method, greeting) for exchange in exchanges]
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults that explain the motions, likely those of the inverse kinematics."""
+    exchanges, greeting, base = judged.exchanges, judged.greeting, judged.base or ()
+    judgements, method = judged.report.judgements, judged.report.method
     comparable = {e.case.name: _comparable(e) for e in exchanges if frames_of(e)}
     wrong = [
         comparable[judgement.case.name]
         for judgement in judgements
         if judgement.case.name in comparable and _is_wrong(judgement)
     ]
-    find_faults = partial(_diagnosis, exchanges, comparable, wrong, greeting, method, base)
-    search = cause_search or CauseSearch()
-    diagnosis = search.run(find_faults, Diagnosis())
+    diagnosis = _diagnosis(exchanges, comparable, wrong, greeting, method, base)
     answers = [
         claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
         for e in exchanges
         if e.case.name in comparable
     ]
-    name_claims = partial(claims.with_claims, diagnosis, judgements, answers, not base)
-    return report(TASK, method, judgements, search.run(name_claims, diagnosis))
+    diagnosis = claims.with_claims(diagnosis, judgements, answers, not base)
+    return with_hints(judgements, diagnosis)
 
 
 def _diagnosis(

@@ -6,7 +6,6 @@ several places, and only differences to the first of them count.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import (
@@ -80,15 +78,10 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Hold the energies against formulas and the work of forces, and name the faults."""
+    """Hold the energies against formulas and the work of forces."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    unexplained = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
-    from .energy_diagnosis import diagnose
-
-    find_faults = partial(diagnose, judgements, greeting.epsilon)
-    diagnosis = (cause_search or CauseSearch()).run(find_faults, unexplained)
+    diagnosis = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
     return TaskReport(TASK, "", judgements, diagnosis)
 
 

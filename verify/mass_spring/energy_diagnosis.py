@@ -9,6 +9,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import sentence
 
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer
 from ..explain import either
 from ..judgement import (
@@ -36,8 +37,9 @@ MAX_EXPLANATIONS = 3
 FITTED = 8
 
 
-def diagnose(judgements: Sequence[CaseJudgement], epsilon: float) -> Diagnosis:
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the energies, if some are wrong."""
+    judgements, epsilon = judged.report.judgements, judged.greeting.epsilon
     answers = [
         (problem_of(judgement.case.inputs), judgement.answer.values)
         for judgement in judgements

@@ -11,10 +11,10 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..explain import TRIAL, Variant, either, explain
-from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Verdict, first_broken
+from ..judgement import Diagnosis, Verdict, first_broken
 from ..laws import hints_of
 from .faults import FORCE_FAULTS, pairs
 from .forces import tolerance
@@ -79,10 +79,9 @@ def variants(
         yield Variant(keys, partial(_predict, faults, problems), is_special)
 
 
-def diagnose(
-    judgements: Sequence[CaseJudgement], exchanges: Sequence[Exchange], greeting: Greeting
-) -> Diagnosis:
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the forces, if some are wrong."""
+    judgements, exchanges, greeting = judged.report.judgements, judged.exchanges, judged.greeting
     wrong = [judgement.verdict >= Verdict.WRONG for judgement in judgements]
     if not any(wrong):
         return Diagnosis()

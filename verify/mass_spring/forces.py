@@ -11,7 +11,6 @@ from plumbob.reference.mass_spring import forces as reference_forces
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, first_broken
@@ -43,15 +42,10 @@ def judge(
     exchanges: Sequence[Exchange],
     greeting: Greeting,
     method: str,
-    cause_search: CauseSearch | None = None,
 ) -> TaskReport:
-    """Hold the forces against the formula and the balance of momentum, and name the faults."""
+    """Hold the forces against the formula and the balance of momentum."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    unexplained = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
-    from .force_diagnosis import diagnose
-
-    find_faults = partial(diagnose, judgements, exchanges, greeting)
-    diagnosis = (cause_search or CauseSearch()).run(find_faults, unexplained)
+    diagnosis = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
     return TaskReport(TASK, "", judgements, diagnosis)
 
 

@@ -22,7 +22,7 @@ from plumbob.text.sentence import sentence
 
 from ..cause_search import CauseSearch
 from ..contestant import Answer, Exchange
-from ..greeting import Step
+from ..greeting import Greeting, Step
 from ..judgement import LEAST_SHARE
 from .faults import MAX_FAULTS, STEP_FAULTS
 from .honest import compatible, declared, honest
@@ -147,15 +147,17 @@ class ModelSearch:
     def __init__(
         self,
         probes: Sequence[Probe],
-        step: Step,
-        epsilon: float,
+        greeting: Greeting,
         faulty_aspects: Collection[str] | None = None,
         cause_search: CauseSearch | None = None,
         is_honest: bool = False,
     ) -> None:
         """Set up the domains of all choices, with faults of some aspects, of all, or none."""
         faulty_aspects = () if is_honest else faulty_aspects
-        self.probes, self.step, self.epsilon = probes, step, epsilon
+        step = greeting.step
+        self.probes, self.greeting, self.step, self.epsilon = (
+            probes, greeting, step, greeting.epsilon,
+        )  # fmt: skip
         self.is_honest = is_honest  # whether no fault is assumed
         self.stages = [stage for probe in probes for stage in probe.stages()]
         self.domains = {
@@ -207,9 +209,7 @@ class ModelSearch:
 
     def with_probes(self, probes: Sequence[Probe]) -> "ModelSearch":
         """Return the search with more probes."""
-        return ModelSearch(
-            [*self.probes, *probes], self.step, self.epsilon, cause_search=self.cause_search
-        )
+        return ModelSearch([*self.probes, *probes], self.greeting, cause_search=self.cause_search)
 
     def run(self, cases: Sequence[Probe] = ()) -> list[ModelMatch]:
         """Return the matches of the probes with the fewest faults, none if there are none.
@@ -529,14 +529,14 @@ def _start(p: SpringProblem) -> Substep:
 
 def matches_of(search: ModelSearch, cases: Sequence[Probe] = ()) -> list[ModelMatch]:
     """Return the matches of probes of steps or of motions, as `ModelSearch.run` does."""
-    probes, step, epsilon = search.probes, search.step, search.epsilon
+    probes, epsilon = search.probes, search.epsilon
     if not any(probe.problem.steps for probe in probes):
         return _step_matches(search, cases)
-    matches = ModelSearch(probes, step, epsilon, ("frames",), search.cause_search).run(cases)
+    matches = ModelSearch(probes, search.greeting, ("frames",), search.cause_search).run(cases)
     if matches:
         return matches
     firsts = [probe.first_step() for probe in probes]
-    of_steps = ModelSearch(firsts, step, epsilon, cause_search=search.cause_search)
+    of_steps = ModelSearch(firsts, search.greeting, cause_search=search.cause_search)
     return _with_frames(_step_matches(of_steps, ()), probes, epsilon)
 
 
@@ -546,12 +546,12 @@ def _step_matches(search: ModelSearch, cases: Sequence[Probe]) -> list[ModelMatc
     fault = velocity_fault(probes, epsilon)
     if fault is None:
         return search.run(cases)
-    matches = ModelSearch(probes, step, epsilon, (), search.cause_search).run(cases)
+    matches = ModelSearch(probes, search.greeting, (), search.cause_search).run(cases)
     if matches:
         return matches
     positions = [probe.positions() for probe in probes]
     position_cases = [case.positions() for case in cases if "positions" in case.answers]
-    of_positions = ModelSearch(positions, step, epsilon, cause_search=search.cause_search)
+    of_positions = ModelSearch(positions, search.greeting, cause_search=search.cause_search)
     matches = [
         _with_velocity(match, fault, probes, step, epsilon)
         for match in of_positions.run(position_cases)

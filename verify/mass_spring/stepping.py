@@ -17,7 +17,7 @@ from plumbob.reference.mass_spring import State
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..cause_search import CauseSearch
+from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..explain import either, share_of
 from ..greeting import Greeting, Step
@@ -73,67 +73,69 @@ class Stepping(NamedTuple):
         """Return cases that suit the solver, the smallest first."""
         return task_cases(self.task, greeting, seed, thorough)
 
-    def judge(
-        self,
-        exchanges: Sequence[Exchange],
-        greeting: Greeting,
-        method: str,
-        cause_search: CauseSearch | None = None,
-    ) -> TaskReport:
-        """Hold answers against the step that is declared, or inferred, and name the faults."""
-        cause_search = cause_search or CauseSearch()
+    def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
+        """Hold answers against the step that is declared, or that an honest program makes."""
         problems = problems_of(exchanges, greeting)
-        is_constant = _repeats(exchanges, 0.0) or _repeats(exchanges, 1.0)  # no step to be found
-        telling = [] if is_constant else probes_of(exchanges, problems)
-        probes = probes_of(exchanges, problems, every=True)
-        step, epsilon, matches = greeting.step, greeting.epsilon, list[ModelMatch]()
-        search = ModelSearch(telling, step, epsilon, cause_search=cause_search)
-        honest_search = ModelSearch(telling, step, epsilon, is_honest=True)
-
-        def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
-            options: Sequence[Option] = honest_options(matches, step)
-            if step.iterations is not None and step.start == "y" and not matches:
-                options = _nearest_start(options, probes, epsilon)
-            follow = partial(iterations.explanation, options, probes, step.start, epsilon)
-            return cause_search.run(lambda: follow(is_hasty, least), None)
-
-        is_iterative = step.method in ("converged", "linearised") or step.iterations is not None
-        iteration = iteration_of(is_hasty=True) if is_iterative else None
-        if iteration is None or iteration.share < 1.0 - UNEXPLAINED:
-            matches = _matches(honest_search, search, probes)
-        if iteration is None and (step.method is not None or matches):
-            iteration = iteration_of(is_hasty=False)
-        judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
-        is_right = iteration is None and bool(matches) and not matches[0].faults
-        find_larger = partial(_faults_of_larger, search, judgements, probes)
-        larger = cause_search.run(find_larger, list[ModelMatch]()) if is_right else []
-        if larger:
-            matches = larger
-            judgements, recognised = _judge_all(exchanges, problems, greeting, matches)
-        diagnosis = _diagnose(judgements, search, matches, probes)
-        is_double = honest_search.is_double() or search.is_double()
-        diagnosis = replace(diagnosis, is_double=is_double and not diagnosis.explained)
-        is_broken = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-        if iteration is None and not diagnosis.explained and is_broken:
-            iteration = iteration_of(is_hasty=False, least=SOLVED)  # small errors break laws
-        if iteration is not None and iteration.share > diagnosis.share:
-            diagnosis = replace(diagnosis, explanations=(iteration,), first_broken=None, hints=())
-        elif not diagnosis.explained:
-            options = honest_options(matches, step)
-            find_hint = partial(iterations.stiffness_hint, options, probes, epsilon)
-            hint = cause_search.run(find_hint, None)
-            first = diagnosis.first_broken if hint is None else first_broken(judgements)
-            hints = diagnosis.hints if hint is None else (hint,)
-            diagnosis = replace(diagnosis, first_broken=first, hints=hints)
-        faults = {fault.aspect for match in matches[:1] for fault in match.faults}
-        is_wrong = diagnosis.explained and (not recognised or "factorisation" in faults)
-        if is_wrong or any(found.share == 1.0 for found in diagnosis.explanations):
-            options = honest_options(matches, step)
-            judgements = [
-                _with_wrong_step(judgement, options, problems[judgement.case.name])
-                for judgement in judgements
-            ]
+        search = ModelSearch(_telling(exchanges, problems), greeting, is_honest=True)
+        matches = search.run(probes_of(exchanges, problems, every=True))
+        judgements = _judge_all(exchanges, problems, greeting, matches)
+        is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+        step, hints = greeting.step, hints_of(judgements)
+        behaviour = _behaviour(honest_options(matches, step), step, is_wrong) if matches else None
+        diagnosis = Diagnosis((), behaviour, _first_broken(judgements), hints)
+        diagnosis = replace(diagnosis, is_double=search.is_double())
         return TaskReport(self.task, "", judgements, diagnosis)
+
+
+def _telling(exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem]) -> list[Probe]:
+    """Return the probes, none if the answers are constant, which are of no step."""
+    is_constant = _repeats(exchanges, 0.0) or _repeats(exchanges, 1.0)
+    return [] if is_constant else probes_of(exchanges, problems)
+
+
+def diagnose(judged: JudgedAnswers) -> Diagnosis:
+    """Return the faults of a step, or of its iterations, that explain the answers."""
+    exchanges, greeting, cause_search = judged.exchanges, judged.greeting, judged.search
+    problems, step, epsilon = problems_of(exchanges, greeting), greeting.step, greeting.epsilon
+    telling, probes = _telling(exchanges, problems), probes_of(exchanges, problems, every=True)
+    judgements, matches = judged.report.judgements, list[ModelMatch]()
+    search = ModelSearch(telling, greeting, cause_search=cause_search)
+    honest_search = ModelSearch(telling, greeting, is_honest=True)
+
+    def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
+        options: Sequence[Option] = honest_options(matches, step)
+        if step.iterations is not None and step.start == "y" and not matches:
+            options = _nearest_start(options, probes, epsilon)
+        follow = partial(iterations.explanation, options, probes, step.start, epsilon)
+        return cause_search.run(lambda: follow(is_hasty, least), None)
+
+    is_iterative = step.method in ("converged", "linearised") or step.iterations is not None
+    iteration = iteration_of(is_hasty=True) if is_iterative else None
+    if iteration is None or iteration.share < 1.0 - UNEXPLAINED:
+        matches = _matches(honest_search, search, probes)
+    if iteration is None and (step.method is not None or matches):
+        iteration = iteration_of(is_hasty=False)
+    if iteration is None and matches and not matches[0].faults:
+        find_larger = partial(_faults_of_larger, search, judgements, probes)
+        matches = cause_search.run(find_larger, list[ModelMatch]()) or matches
+    diagnosis = _diagnose(judgements, search, matches, probes)
+    is_broken = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
+    if iteration is None and not diagnosis.explained and is_broken:
+        iteration = iteration_of(is_hasty=False, least=SOLVED)  # small errors break laws
+    if iteration is not None and iteration.share > diagnosis.share:
+        diagnosis = replace(diagnosis, explanations=(iteration,), first_broken=None, hints=())
+    elif not diagnosis.explained:
+        options = honest_options(matches, step)
+        find_hint = partial(iterations.stiffness_hint, options, probes, epsilon)
+        hint = cause_search.run(find_hint, None)
+        first = diagnosis.first_broken if hint is None else first_broken(judgements)
+        hints = diagnosis.hints if hint is None else (hint,)
+        diagnosis = replace(diagnosis, first_broken=first, hints=hints)
+    if not diagnosis.explained:
+        return diagnosis
+    options = honest_options(matches, step)  # the same step without the fault
+    expected = {name: predicted(*apply(options, p, StepModel())) for name, p in problems.items()}
+    return replace(diagnosis, expected=expected)
 
 
 def _matches(
@@ -165,18 +167,16 @@ def _judge_all(
     problems: Mapping[str, SpringProblem],
     greeting: Greeting,
     matches: Sequence[ModelMatch],
-) -> tuple[list[CaseJudgement], bool]:
-    """Return the judgements of all answers, and whether their step is declared or recognised."""
+) -> list[CaseJudgement]:
+    """Return the judgements of all answers, by the step that is declared or recognised."""
     options = honest_options(matches, greeting.step)
-    faults = {fault.aspect for fault in matches[0].faults} if matches else {"unknown"}
-    recognised = greeting.step.method is not None or faults <= {"factorisation"}
-    judgements = [
+    recognised = greeting.step.method is not None or bool(matches)
+    return [
         _judge_case(
             exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
         )
         for exchange in exchanges
     ]
-    return judgements, recognised
 
 
 def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
@@ -497,23 +497,3 @@ def _first_broken(judgements: Sequence[CaseJudgement]) -> Sentence | None:
     is_pinned = all(len(case.inputs.get("pinned", [0])) for case in cases)
     family = "later cases" if cases[0].family == "pins" and not is_pinned else cases[0].family
     return sentence("{law} {trace}", law=law, trace=trace_of(family))
-
-
-def _with_wrong_step(
-    judgement: CaseJudgement, options: tuple[Option, ...], p: SpringProblem
-) -> CaseJudgement:
-    """Return a judgement with an undecided step judged as wrong, for a fault explains it.
-
-    Expected is the answer of the same step without the fault.
-    """
-    message = sentence(
-        "No correct time step gives these answers, but a step with a known mistake does."
-    )
-    findings = [
-        replace(finding, verdict=Verdict.WRONG, sentence=message)
-        if (finding.law, finding.verdict) == ("declared step", Verdict.UNDECIDED)
-        else finding
-        for finding in judgement.findings
-    ]
-    expected = judgement.expected or predicted(*apply(options, p, StepModel()))
-    return replace(judgement, findings=tuple(findings), expected=expected)

@@ -23,10 +23,9 @@ from ..gaps import difference
 from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
-from ..kinematics.inverse_kinematics import OF_A_MISTAKE
 from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
-from ..laws import LAWS, finding
+from ..laws import LAWS
 from ..precision import judging_greeting
 from ..task import BUILDS_ON, TASKS
 from .mutants import Mutant, Program
@@ -86,12 +85,7 @@ def with_changed_line(report: TaskReport, greeting: Greeting) -> TaskReport:
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
-    remark = finding(OF_A_MISTAKE, 1.0)
-    judgements = [
-        replace(j, findings=(*j.findings, remark)) if j in doubtful else j
-        for j in report.judgements
-    ]
-    return replace(report, judgements=judgements, diagnosis=diagnosis)
+    return replace(report, diagnosis=diagnosis)
 
 
 def _least_share(report: TaskReport) -> float:

@@ -9,10 +9,11 @@ import numpy as np
 
 from plumbob.text.sentence import Say, Sentence, sentence
 
+from ..disciplines import DISCIPLINES
 from ..door.saved import SavedCase, cases_of
 from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
 from ..judgement import CaseJudgement, Verdict
-from ..verify import DISCIPLINES, judge_cases, trials
+from ..verify import judge_cases, trials
 from .terminal import numbers, wrapped
 
 # The lines around a change, and of the numbers of a failing case.
