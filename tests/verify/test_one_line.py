@@ -20,7 +20,7 @@ from plumbob.verify.fault_programs import (
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Explanation, Verdict
 from plumbob.verify.kinematics.limits import solve_within
-from plumbob.verify.one_line import search
+from plumbob.verify.one_line import right_programs, search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.screen import terminal
 from plumbob.verify.screen.words import Presentation, speaker
@@ -48,7 +48,9 @@ LINES = {fault.name: fault for fault in coded_faults().values() if fault.family 
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_changed_line_is_named(name, monkeypatch):
     fault = LINES[name]
-    monkeypatch.setattr(search, "SELF_NAMED", FAMILIES)  # lines that are known faults as well
+    monkeypatch.setattr(
+        right_programs, "SELF_NAMED", FAMILIES
+    )  # lines that are known faults as well
     (explanation,) = changed_lines(fault.wrong_program, fault.task)
     assert explanation.codes == (fault.code,)
     assert explanation.share == 1.0
@@ -71,7 +73,7 @@ def test_every_known_fault_of_every_program_compiles():
         for name, source in sources.items()
         for method in ("", "ccd", "fabrik")
         if f"def {method}" in source
-        for fault in search._faults_in(source, PROGRAMS[name]["task"], method)
+        for fault in right_programs.faults_in(source, PROGRAMS[name]["task"], method)
     }
     assert len(planted) > 3_000
     for program, name in planted.items():
@@ -150,7 +152,7 @@ def test_jacobians_are_compared_whichever_part_comes_first():
     case = DISCIPLINES["robot_jacobian"].cases(Greeting(PROTOCOL, ()), "", 0, False)[0]
     J = np.arange(12.0).reshape(6, 2)
     answers = [Answer({"jacobian": np.roll(J, shift, axis=0)}, 0.0) for shift in (0, 3)]
-    first, second = (search._comparable(Exchange(case, a, a)).answer.values for a in answers)
+    first, second = (right_programs.comparable(Exchange(case, a, a)).answer.values for a in answers)
     np.testing.assert_array_equal(first["jacobian"], second["jacobian"])
 
 

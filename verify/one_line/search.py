@@ -17,18 +17,17 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..case import Case
 from ..contestant import Answer, Exchange, Failure
 from ..explain import MORE, Variant, explain
-from ..fault_programs import NOTES, PROGRAMS, CodedFault, coded_faults, source_of
-from ..functions import call
+from ..fault_programs import NOTES, CodedFault
 from ..gaps import difference
-from ..greeting import Greeting, Step
+from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.limits import READINGS
-from ..kinematics.sweeps import ROUNDED, PoseTrial
+from ..kinematics.sweeps import ROUNDED
 from ..laws import LAWS
 from ..precision import judging_greeting
-from ..task import BUILDS_ON, TASKS
 from .mutants import Mutant, Program
+from .right_programs import answer_of, comparable, faults_in, programs_of
 
 _TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
 FAULTS = _TABLE["line"]
@@ -56,8 +55,6 @@ IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
 ITERATIONS = "max_iterations"
-# Faults of these families are named in other ways than by the lines of a program.
-SELF_NAMED = ("LINE", "STATE")
 # Longer lines are cut to what differs, with so many letters before and after.
 LINE, AROUND = 60, 20
 # Relative differences that rounding and the ends of iterations explain, by precision.
@@ -141,7 +138,7 @@ def changed_lines(
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
-        for program in _programs(report, greeting.step)
+        for program in programs_of(report.task, report.method, greeting.step)
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
     if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
@@ -163,7 +160,7 @@ def _gives(
     program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
 ) -> bool:
     """Return whether a right program gives all answers."""
-    pairs = ((_answer(program, report, one.case), one.answer) for one in compared)
+    pairs = ((answer_of(program, report.method, one.case), one.answer) for one in compared)
     return all(
         isinstance(answer, Answer) and difference(right, answer.values) <= tolerance
         for right, answer in pairs
@@ -183,14 +180,14 @@ def _of_program(
     do not speak for a change. Lines are changed where no known fault gives all answers, except in
     `functions` that are changed already, or in none.
     """
-    run = partial(_answer, program, report)
+    run = partial(answer_of, program, report.method)
     different, same, passes = _compare(program, run, compared, tolerance)
     if not different:
         return ()
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
     def variants() -> Iterator[Variant]:
-        for fault in _faults_in(program.source, report.task, report.method):
+        for fault in faults_in(program.source, report.task, report.method):
             faults[fault.name] = fault
             with suppress(SyntaxError):
                 wrong = program.with_source(fault.planted_in(program.source))
@@ -239,45 +236,6 @@ def _compare(
     return (single if len(single) >= MIN_DIFFERENT else different), same, passes
 
 
-def _faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
-    """Return the known faults of a task, and of those it builds upon, whose lines a program has."""
-    return [
-        fault
-        for fault in coded_faults().values()
-        if fault.family not in SELF_NAMED
-        and (fault.task in BUILDS_ON.get(task, ()) or _is_shared(fault, task, method))
-        and fault.lines
-        and all(source.count(right) == 1 for right, _ in fault.lines)
-    ]
-
-
-def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
-    """Return whether a program of a task may have a fault: of its method, or of all methods."""
-    return _is_of(fault.program, task, "" if fault.family == "QUAT" else method)
-
-
-def _is_of(program: str, task: str, method: str) -> bool:
-    """Return whether a right program has a task, and a method of it."""
-    return bool(PROGRAMS[program]["task"] == task) and f"def {method}" in source_of(program)
-
-
-def _programs(report: TaskReport, step: Step) -> Iterator[Program]:
-    """Yield the right programs of a task that have its method and the declared step."""
-    for name, entry in PROGRAMS.items():
-        if not _is_of(name, report.task, report.method):
-            continue
-        program = Program(source_of(name))
-        own = program.names.get("PLUMBOB", {}).get("step", {})
-        choices = {field.upper() for field in own} & program.names.keys()
-        declared = {field: getattr(step, field) for field in own}
-        program.choose({c: v for c in choices if (v := declared[c.lower()]) is not None})
-        if entry.get("searched", True) and all(
-            value in (None, own[field]) or field.upper() in choices
-            for field, value in declared.items()
-        ):
-            yield program
-
-
 def _compared(report: TaskReport, doubtful: Sequence[CaseJudgement]) -> list[Exchange]:
     """Return small and large answers, the wrong or doubtful answers first."""
     judgements = [
@@ -294,7 +252,7 @@ def _compared(report: TaskReport, doubtful: Sequence[CaseJudgement]) -> list[Exc
     telling = [*wrong[:SMALL], *wrong[SMALL:][-LARGE:], *right[:SMALL]]
     single = [j for j in right if _is_single(j) and j not in telling]
     telling += single if judgements is not is_sweep else []
-    return [_comparable(Exchange(j.case, j.answer, j.answer)) for j in telling if wrong]
+    return [comparable(Exchange(j.case, j.answer, j.answer)) for j in telling if wrong]
 
 
 def _is_single(judgement: CaseJudgement) -> bool:
@@ -320,39 +278,6 @@ def _repeats(output: Any, array: Any) -> bool:
     return is_alike and np.allclose(np.abs(output), np.abs(array), rtol=0.0, atol=ROUNDED)
 
 
-def _comparable(exchange: Exchange) -> Exchange:
-    """Return what no choice of a program changes of an exchange.
-
-    The larger part of a Jacobian comes last, and global rotations are normalised.
-    """
-    if exchange.case.task == "forward_kinematics":
-        assert isinstance(exchange.answer, Answer)
-        values = dict(exchange.answer.values)
-        if "rotations" in values:
-            lengths = np.linalg.norm(values["rotations"], axis=-1, keepdims=True)
-            values["rotations"] = values["rotations"] / np.where(lengths > 0.0, lengths, 1.0)
-        return replace(exchange, answer=Answer(values, 0.0))
-    if exchange.case.task == "robot_jacobian":
-        assert isinstance(exchange.answer, Answer)
-        parts = sorted(np.split(exchange.answer.values["jacobian"], 2), key=np.linalg.norm)
-        return replace(exchange, answer=Answer({"jacobian": np.concatenate(parts)}, 0.0))
-    if exchange.case.task != "inverse_kinematics":
-        return exchange
-    return PoseTrial(exchange).comparable
-
-
-def _answer(program: Program, report: TaskReport, case: Case) -> Mapping[str, Any]:
-    function = program.names.get(report.method) or program.names.get(report.task)
-    if function is None:
-        function = next(program.names[m] for m in ("ccd", "fabrik") if m in program.names)
-    answer = call(function, TASKS[case.task], case.inputs)
-    if not isinstance(answer, Answer):
-        raise ArithmeticError(answer.sentence)
-    comparable = _comparable(Exchange(case, answer, answer)).answer
-    assert isinstance(comparable, Answer)
-    return comparable.values
-
-
 def _changed_answer(
     program: Program,
     mutant: Mutant,
@@ -368,7 +293,7 @@ def _faulty_answer(
     program: Program, report: TaskReport, passes: Mapping[str, int], case: Case
 ) -> Mapping[str, Any]:
     with program.within(passes[case.name]):
-        return _answer(program, report, case)
+        return answer_of(program, report.method, case)
 
 
 def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:

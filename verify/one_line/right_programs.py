@@ -1,0 +1,92 @@
+"""The right programs of a task, known faults in their lines, and the comparable part of answers."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..case import Case
+from ..contestant import Answer, Exchange
+from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
+from ..functions import call
+from ..greeting import Step
+from ..kinematics.sweeps import PoseTrial
+from ..task import BUILDS_ON, TASKS
+from .mutants import Program
+
+# Faults of these families are named in other ways than by the lines of a program.
+SELF_NAMED = ("LINE", "STATE")
+
+
+def faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
+    """Return the known faults of a task, and of those it builds upon, whose lines a program has."""
+    return [
+        fault
+        for fault in coded_faults().values()
+        if fault.family not in SELF_NAMED
+        and (fault.task in BUILDS_ON.get(task, ()) or _is_shared(fault, task, method))
+        and fault.lines
+        and all(source.count(right) == 1 for right, _ in fault.lines)
+    ]
+
+
+def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
+    """Return whether a program of a task may have a fault: of its method, or of all methods."""
+    return is_of(fault.program, task, "" if fault.family == "QUAT" else method)
+
+
+def is_of(program: str, task: str, method: str) -> bool:
+    """Return whether a right program has a task, and a method of it."""
+    return bool(PROGRAMS[program]["task"] == task) and f"def {method}" in source_of(program)
+
+
+def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
+    """Yield the right programs of a task that have its method and the declared step."""
+    for name, entry in PROGRAMS.items():
+        if not is_of(name, task, method):
+            continue
+        program = Program(source_of(name))
+        own = program.names.get("PLUMBOB", {}).get("step", {})
+        choices = {field.upper() for field in own} & program.names.keys()
+        declared = {field: getattr(step, field) for field in own}
+        program.choose({c: v for c in choices if (v := declared[c.lower()]) is not None})
+        if entry.get("searched", True) and all(
+            value in (None, own[field]) or field.upper() in choices
+            for field, value in declared.items()
+        ):
+            yield program
+
+
+def comparable(exchange: Exchange) -> Exchange:
+    """Return what no choice of a program changes of an exchange.
+
+    The larger part of a Jacobian comes last, and global rotations are normalised.
+    """
+    if exchange.case.task == "forward_kinematics":
+        assert isinstance(exchange.answer, Answer)
+        values = dict(exchange.answer.values)
+        if "rotations" in values:
+            lengths = np.linalg.norm(values["rotations"], axis=-1, keepdims=True)
+            values["rotations"] = values["rotations"] / np.where(lengths > 0.0, lengths, 1.0)
+        return replace(exchange, answer=Answer(values, 0.0))
+    if exchange.case.task == "robot_jacobian":
+        assert isinstance(exchange.answer, Answer)
+        parts = sorted(np.split(exchange.answer.values["jacobian"], 2), key=np.linalg.norm)
+        return replace(exchange, answer=Answer({"jacobian": np.concatenate(parts)}, 0.0))
+    if exchange.case.task != "inverse_kinematics":
+        return exchange
+    return PoseTrial(exchange).comparable
+
+
+def answer_of(program: Program, method: str, case: Case) -> Mapping[str, Any]:
+    """Return the comparable outputs of a right program; raise ArithmeticError if it has none."""
+    function = program.names.get(method) or program.names.get(case.task)
+    if function is None:
+        function = next(program.names[m] for m in ("ccd", "fabrik") if m in program.names)
+    answer = call(function, TASKS[case.task], case.inputs)
+    if not isinstance(answer, Answer):
+        raise ArithmeticError(answer.sentence)
+    outputs = comparable(Exchange(case, answer, answer)).answer
+    assert isinstance(outputs, Answer)
+    return outputs.values
