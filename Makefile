@@ -9,6 +9,7 @@
 # make docs     the documentation, as a site in build/docs that works offline
 # make drawing  draw the pictures of docs/ anew, the architecture's from the imports
 # make messages renew the translations of `plumbob verify` from its sentences
+# make dictionary    compute anew what changes of right programs answer, some CPU minutes
 # make locks    renew the lock files after a change of pyproject.toml; UPGRADE=--upgrade
 #               takes the newest versions of everything
 # make clean    remove everything made here
@@ -28,7 +29,7 @@ PARALLEL = -n auto --dist worksteal
 UV ?= build/uv/bin/uv
 export UV_PYTHON_DOWNLOADS := never
 
-.PHONY: help report test test-all peers lint bench sample docs drawing messages locks wheels test-pythons test-lowest clean
+.PHONY: help report test test-all peers lint bench sample docs drawing messages dictionary locks wheels test-pythons test-lowest clean
 
 help:
 	@sed -n 's/^# \{0,1\}//p' $(MAKEFILE_LIST)
@@ -69,6 +70,9 @@ drawing: .venv/installed
 
 messages: .venv/installed
 	$(BIN)/python tools/translate.py
+
+dictionary: .venv/installed
+	$(BIN)/python tools/write_dictionary.py
 
 .venv/installed: requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \

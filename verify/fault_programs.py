@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,7 +24,19 @@ FOLDER = Path(__file__).parent
 # The files with faults, those of kinematics first.
 FILES = sorted(FOLDER.rglob("faults.toml"))
 _TABLE = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
-PROGRAMS: Mapping[str, Any] = _TABLE["programs"]
+
+
+def _in_forms(name: str, entry: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
+    """Yield the program of an entry, or a program of each combination of its forms."""
+    forms = entry.get("forms", {})
+    for number, texts in enumerate(product(*forms.values()), 1):
+        replaced = (*entry.get("replaced", ()), *zip(forms, texts, strict=True))
+        yield f"{name} {number}" if forms else name, {**entry, "replaced": replaced}
+
+
+PROGRAMS: Mapping[str, Any] = dict(
+    chain.from_iterable(_in_forms(name, entry) for name, entry in _TABLE["programs"].items())
+)
 FAMILIES: Mapping[str, Any] = _TABLE["families"]
 NOTES: Mapping[str, Any] = _TABLE["notes"]
 
@@ -98,7 +110,7 @@ def source_of(program: str) -> str:
     entry = PROGRAMS[program]
     name = re.sub(r"\W+", "_", program.lower().replace("'", ""))
     imports, bodies = dict[str, None](), dict[str, str]()
-    _collect(entry.get("file", name), entry.get("replaced", ()), imports, bodies)
+    _collect(entry.get("file", name), entry["replaced"], imports, bodies)
     return "\n".join(imports) + "\n\n\n" + "\n\n\n".join(bodies.values()) + "\n"
 
 

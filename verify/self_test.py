@@ -37,7 +37,7 @@ from .mass_spring.force_diagnosis import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.options import Option, apply
 from .mass_spring.problem import problem_of, state_of, system_of
-from .one_line.search import BY_LINES
+from .one_line.right_programs import BY_LINES
 from .verify import verify
 
 HONEST = "honest solvers"

@@ -178,7 +178,7 @@ class Attempt:
         diagnose = partial(self._diagnosis, search, _known_faults(self.task, reports, causes))
         report = search.run(lambda: _with_diagnosis(verdict, diagnose), verdict)
         if not causes and report.greeting is not None:
-            find_line = partial(with_changed_line, report, report.greeting)
+            find_line = partial(with_changed_line, report, report.greeting, self.contestant)
             report = search.run(find_line, report)
         return _with_cause(report, causes)
 

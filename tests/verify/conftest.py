@@ -15,7 +15,7 @@ def without_changed_lines(request, monkeypatch):
     """Leave the search of changed lines, seconds for each unknown mistake, to the tests of it."""
     if not request.module.__name__.endswith("test_one_line"):
         module = sys.modules["plumbob.verify.verify"]
-        monkeypatch.setattr(module, "with_changed_line", lambda report, greeting: report)
+        monkeypatch.setattr(module, "with_changed_line", lambda report, *arguments: report)
 
 
 @pytest.fixture

@@ -101,6 +101,10 @@ class Program:
         self._passes = 0
         return run(), self._passes
 
+    def text_of(self, function: str) -> str:
+        """Return the source of a function, with the change of a mutant while it is yielded."""
+        return next(ast.unparse(part) for part in self._functions if part.name == function)
+
     @contextmanager
     def within(self, passes: int) -> Iterator[None]:
         """Run the program, or stop it long after the passes that the right program takes."""

@@ -1,7 +1,9 @@
 """The right programs of a task, known faults in their lines, and the comparable part of answers."""
 
+import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,6 +17,12 @@ from ..kinematics.sweeps import PoseTrial
 from ..task import BUILDS_ON, TASKS
 from .mutants import Program
 
+_TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
+FAULTS = _TABLE["line"]
+# The names of all faults that only the lines of programs tell.
+BY_LINES = {*FAULTS, *_TABLE["known"]}
+# Of changes that no answer tells apart the first of these kinds is named.
+KINDS = list(FAULTS)
 # Faults of these families are named in other ways than by the lines of a program.
 SELF_NAMED = ("LINE", "STATE")
 

@@ -1,13 +1,11 @@
 """Search the right program with a known fault, or a changed line, that gives wrong answers."""
 
 import re
-import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from itertools import takewhile
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,9 +13,11 @@ import numpy as np
 from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
-from ..contestant import Answer, Exchange, Failure
-from ..explain import MORE, Variant, explain
-from ..fault_programs import NOTES, CodedFault
+from ..contestant import Answer, Contestant, Exchange, Failure
+from ..dictionary.entry import Entry
+from ..dictionary.look_up import look_up
+from ..explain import MORE, Variant, explain, together
+from ..fault_programs import NOTES, CodedFault, coded_faults, source_of
 from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
@@ -27,14 +27,8 @@ from ..kinematics.sweeps import ROUNDED
 from ..laws import LAWS
 from ..precision import judging_greeting
 from .mutants import Mutant, Program
-from .right_programs import answer_of, comparable, faults_in, programs_of
+from .right_programs import FAULTS, KINDS, answer_of, comparable, faults_in, programs_of
 
-_TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
-FAULTS = _TABLE["line"]
-# The names of all faults that only the lines of programs tell.
-BY_LINES = {*FAULTS, *_TABLE["known"]}
-# Of changes that no answer tells apart the first of these kinds is named.
-KINDS = list(FAULTS)
 # The most small and large wrong answers, and small right ones, that are compared with programs; a
 # program has to give the first of them.
 SMALL, LARGE, TRIAL = 9, 3, 1
@@ -61,11 +55,13 @@ LINE, AROUND = 60, 20
 TOLERANCE = {"double": 1e-7, "single": 2e-4}
 
 
-def with_changed_line(report: TaskReport, greeting: Greeting) -> TaskReport:
+def with_changed_line(
+    report: TaskReport, greeting: Greeting, contestant: Contestant | None = None
+) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
     Beside a mistake that explains most answers, or where all targets are reached, the search is for
-    known faults that explain all.
+    known faults that explain all. A `contestant` can be asked for what a dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
@@ -77,7 +73,7 @@ def with_changed_line(report: TaskReport, greeting: Greeting) -> TaskReport:
         if named or not doubtful:
             return report
         share = 1.0
-    explanations = changed_lines(report, greeting, doubtful, is_known)
+    explanations = changed_lines(report, greeting, doubtful, is_known, contestant)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -125,17 +121,24 @@ def changed_lines(
     greeting: Greeting,
     doubtful: Sequence[CaseJudgement] = (),
     is_known: bool = False,
+    contestant: Contestant | None = None,
 ) -> tuple[Explanation, ...]:
     """Return the change of a line that gives most wrong or doubtful answers, () if too few.
 
-    If `is_known`, the search is for known faults alone.
+    If `is_known`, the search is for known faults alone. What a dictionary has is looked up.
     """
     compared = _compared(report, doubtful)
     if not compared:
         return ()
-    tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
+    precision = judging_greeting(compared, greeting)[0].precision
+    tolerance = TOLERANCE[precision]
     best, functions = tuple[Explanation, ...](), set[str]()
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
+    if contestant is not None and not doubtful and not has_limits:
+        proposals = look_up(contestant, report.task, report.method, greeting, precision)
+        if proposals is not None and proposals.is_wrong:
+            entries = [entry for entry in proposals.entries if entry.codes or not is_known]
+            return _of_entries(entries, report, compared, tolerance)
     programs = [
         program
         for program in programs_of(report.task, report.method, greeting.step)
@@ -208,9 +211,67 @@ def _of_program(
             else _describe(mutants, keys)
         )
 
-    telling = [*different, *same[: max(len(different), MIN_DIFFERENT)]]
-    trial = TRIAL_OF_QUARTERS if report.task == "forward_kinematics" else TRIAL
-    return explain(variants(), telling, lambda _: tolerance, describe, trial)[0]
+    telling = _telling(different, same)
+    return explain(variants(), telling, lambda _: tolerance, describe, _trial(report))[0]
+
+
+def _of_entries(
+    entries: Sequence[Entry], report: TaskReport, compared: Sequence[Exchange], tolerance: float
+) -> tuple[Explanation, ...]:
+    """Return the entry of a dictionary that gives most answers, () if too few."""
+    best = tuple[Explanation, ...]()
+    by_program = dict[str, list[Entry]]()
+    for entry in entries:
+        by_program.setdefault(entry.program, []).append(entry)
+    for name, changes in by_program.items():
+        explanations = _of_changes(Program(source_of(name)), changes, report, compared, tolerance)
+        best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
+        if best and best[0].share == 1.0:
+            break
+    return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _of_changes(
+    program: Program,
+    entries: Sequence[Entry],
+    report: TaskReport,
+    compared: Sequence[Exchange],
+    tolerance: float,
+) -> tuple[Explanation, ...]:
+    """Return the changes of a program that give answers, as `_of_program` does."""
+    run = partial(answer_of, program, report.method)
+    different, same, passes = _compare(program, run, compared, tolerance)
+    if not different:
+        return ()
+    ordered = sorted(entries, key=lambda entry: (max(len(entry.codes), 1), not entry.codes))
+    changes = dict[str, Entry]()
+
+    def variants() -> Iterator[Variant]:
+        for number, entry in enumerate(ordered):
+            if entry.codes or len(different) >= MIN_DIFFERENT:
+                faults = tuple(coded_faults()[code].name for code in entry.codes) or (str(number),)
+                changes[" + ".join(faults)] = entry
+                with suppress(SyntaxError, ValueError):
+                    predict = partial(_faulty_answer, entry.changed_program(), report, passes)
+                    yield Variant(faults, predict, is_special=not entry.codes)
+
+    def describe(keys: Sequence[str]) -> Sentence:
+        if not changes[keys[0]].codes:
+            return _describe(changes, keys, changes[keys[0]].count)
+        faults = [coded_faults()[code] for code in changes[keys[0]].codes]
+        return together([with_code(fault.code, fault.sentence) for fault in faults])
+
+    return explain(variants(), _telling(different, same), lambda _: tolerance, describe,
+                   _trial(report))[0]  # fmt: skip
+
+
+def _telling(different: Sequence[Exchange], same: Sequence[Exchange]) -> list[Exchange]:
+    """Return answers that a program does not give, then no more of the others."""
+    return [*different, *same[: max(len(different), MIN_DIFFERENT)]]
+
+
+def _trial(report: TaskReport) -> int:
+    return TRIAL_OF_QUARTERS if report.task == "forward_kinematics" else TRIAL
 
 
 def _compare(
@@ -296,8 +357,13 @@ def _faulty_answer(
         return answer_of(program, report.method, case)
 
 
-def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
-    """Return the sentence of the likeliest changes, in up to two functions, of equal answers."""
+def _describe(
+    mutants: Mapping[str, Mutant | Entry], keys: Sequence[str], count: int = 1
+) -> Sentence:
+    """Return the sentence of the likeliest changes, in up to two functions, of equal answers.
+
+    They are the likeliest of `count` changes.
+    """
     ordered = sorted(
         (mutants[key] for key in keys),
         key=lambda m: (KINDS.index(m.kind), abs(len(m.right) - len(m.wrong)), len(m.wrong)),
@@ -326,6 +392,9 @@ def _describe(mutants: Mapping[str, Mutant], keys: Sequence[str]) -> Sentence:
     for note in NOTES.values():
         if any(text in mutant.right for text in note["texts"]):
             words = sentence("{words} {note}", words=words, note=Sentence(note["sentence"], {}))
+    if count > 1:
+        words = sentence("{words} This is one of {count} changes that give the same answers.",
+                         words=words, count=count)  # fmt: skip
     return with_code(entry["code"], words)
 
 

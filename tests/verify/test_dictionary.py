@@ -1,0 +1,148 @@
+"""A look-up proposes the changes of right programs that answer a few requests as a solver does."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from plumbob.verify.contestant import Answer
+from plumbob.verify.dictionary import look_up as module
+from plumbob.verify.dictionary.build import digest
+from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, read
+from plumbob.verify.dictionary.look_up import UNSTEADY, look_up
+from plumbob.verify.dictionary.requests import FK, TASKS, keys, requests
+from plumbob.verify.fault_programs import coded_faults, source_of
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.one_line.mutants import Program
+from plumbob.verify.one_line.right_programs import answer_of
+from plumbob.verify.one_line.search import with_changed_line
+from plumbob.verify.verify import DISCIPLINES, judge_cases
+
+dictionary_of = cache(lambda task, method: read(file_of(task, method)))
+# Most entries are tried in the slow run alone; a hundredth is enough to see a stale file.
+EVERY = 100
+
+
+def recomputed(entry, task, method):
+    """Return the keys of an entry, as its program answers now."""
+    program, base = entry.changed_program(), Program(source_of(TASKS[task, method]))
+    rows = []
+    for case in requests(task, method):
+        with np.errstate(all="ignore"), program.within(100):
+            try:
+                values = answer_of(program, method, case)
+            except Exception:
+                values = {}
+        rows.append(keys(values, answer_of(base, method, case), case))
+    return np.array(rows)
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("every", [EVERY, pytest.param(1, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("task", "method"), TASKS)
+def test_entries_answer_as_the_file_says(task, method, every):
+    dictionary = dictionary_of(task, method)
+    for entry, row in list(zip(dictionary.entries, dictionary.keys, strict=True))[::every]:
+        np.testing.assert_allclose(recomputed(entry, task, method), row, rtol=1e-6, atol=1e-7)
+
+
+@pytest.mark.parametrize(("task", "method"), TASKS)
+def test_a_dictionary_is_of_the_programs_as_they_are(task, method):
+    assert dictionary_of(task, method).digest == digest(task, method), "run `make dictionary`"
+
+
+def test_dictionaries_are_small():
+    assert sum(file_of(*key).stat().st_size for key in TASKS) <= 1_000_000
+
+
+def test_a_file_holds_what_was_written(tmp_path):
+    entries = [Entry("ccd", ("PB-CCD-001",)), Entry("ccd", (), "sign", "f", "a", "-a", "text", 3)]
+    written = Dictionary("0", entries, np.array([[[0.5, np.nan]], [[1e-3, 2.0]]]))
+    written.write(tmp_path / "x")
+    digest_, *_ = dictionary = read(tmp_path / "x")
+    assert (digest_, dictionary.entries) == ("0", entries)
+    np.testing.assert_allclose(dictionary.keys, written.keys, rtol=1e-7)
+
+
+class Solver(FunctionContestant):
+    """A solver that counts its starts and questions, with answers that may be rounded."""
+
+    def __init__(self, source, kind=float, noise=0.0):
+        names = {}
+        exec(compile(source, "solver", "exec"), names)
+        super().__init__({FK: names[FK]}, Greeting(PROTOCOL, (FK,)))
+        self.kind, self.noise, self.log = kind, noise, []
+
+    def answer(self, case):
+        self.log.append(case.name)
+        values = super().answer(case).values
+        change = self.noise * len(self.log)
+        return Answer({k: (v + change).astype(self.kind).astype(float) for k, v in values.items()},
+                      0.0)  # fmt: skip
+
+    def close(self):
+        self.log.append("close")
+
+
+def proposals(solver, precision="double"):
+    return look_up(solver, FK, "", solver.greeting, precision)
+
+
+FAULT = "PB-FK-002"
+
+
+@pytest.mark.parametrize(("kind", "precision"), [(float, "double"), (np.float32, "single")])
+def test_a_known_fault_is_proposed_first_in_each_precision(kind, precision):
+    solver = Solver(coded_faults()[FAULT].wrong_program, kind)
+    first = proposals(solver, precision).entries[0]
+    assert first.codes == (FAULT,)
+    assert len(proposals(solver, precision).entries) <= module.MAX_CANDIDATES
+
+
+def test_requests_are_sent_twice_to_a_new_process():
+    solver = Solver(source_of("forward kinematics"))
+    result = proposals(solver)
+    names = [case.name for case in requests(FK, "")]
+    assert solver.log == ["close", *names, *names]
+    assert (result.entries, result.is_wrong) == ([], False)
+
+
+def test_nothing_is_looked_up_for_answers_that_differ():
+    result = proposals(Solver(source_of("forward kinematics"), noise=1e-3))
+    assert (result.entries, result.hint) == ((), UNSTEADY)
+
+
+@pytest.mark.parametrize("restriction", [{"planar": True}, {"rotations": False}])
+def test_a_restricted_solver_has_no_dictionary(restriction):
+    greeting = Greeting(PROTOCOL, (FK,), **restriction)
+    assert look_up(Solver(source_of("forward kinematics")), FK, "", greeting, "double") is None
+
+
+def test_a_second_mistake_in_another_request_hides_no_first():
+    """A chain is told apart though trees answer otherwise."""
+    source = coded_faults()[FAULT].wrong_program.replace(
+        "    return {", "    if len(parents) > 5:\n        x = 1.7 * x\n    return {"
+    )
+    assert FAULT in {code for entry in proposals(Solver(source)).entries for code in entry.codes}
+
+
+@pytest.mark.usefixtures("verdict_alone")
+@pytest.mark.parametrize("factor", [1.0, 1.1])
+def test_cases_decide_what_is_named(factor):
+    """A proposal that does not give the answers to the cases is not named."""
+    line = "    q = local_rotations  # w, x, y, z\n"
+    source = source_of("forward kinematics").replace(line, line + "    q = q * [1, -1, -1, -1]\n")
+    many = (
+        f"    if len(parents) != 7 and len(parents) != 5:\n        x = {factor} * x\n    return {{"
+    )
+    solver = Solver(source.replace('    return {"p', many + '"p'))
+    cases = DISCIPLINES[FK].cases(solver.greeting, "", 0, False)
+    report = judge_cases(solver, FK, "", cases)
+    explained = with_changed_line(report, solver.greeting, solver).diagnosis.explanations
+    assert bool(explained) is (factor == 1.0)
+
+
+def test_a_changed_line_says_how_many_are_equal():
+    counts = [entry.count for entry in dictionary_of(FK, "").entries]
+    assert max(counts) > 1

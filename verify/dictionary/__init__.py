@@ -1,0 +1,1 @@
+"""What every change of a right program answers to a few requests, computed once."""

@@ -1,0 +1,155 @@
+"""Compute a dictionary: every known fault and changed line of the right programs of a task."""
+
+import hashlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import partial
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from ..case import Case
+from ..fault_programs import PROGRAMS, source_of
+from ..one_line.mutants import Program
+from ..one_line.right_programs import answer_of, faults_in, is_of
+from .entry import Dictionary, Entry, likelihood
+from .requests import FK, OUTPUTS, TASKS, fractions, keys, requests
+
+# Differences of keys above this tell answers apart, the shortest distance of a look-up.
+DISTINCT = 1e-6
+# A change whose keys move by more than the second number when inputs move by the first, relative,
+# is left out: rounding would decide what it answers.
+NUDGE, MOVED = 1e-14, 1e-9
+# The most entries with equal keys that are kept, the likeliest ones.
+EQUAL = 3
+# Keys beyond this come from divisions by nearly zero.
+LARGEST = 1e6
+# The functions whose changes are tried in each program: they do other things to other forms.
+IN_FORMS = {"conjugate", "cross", "product", "product_of_vectors", "by_cross", "by_product"}
+
+
+def digest(task: str, method: str) -> str:
+    """Return a digest of the programs, the lines of faults and the requests."""
+    names = programs_of(task, method)
+    parts: list[Any] = [(name, source_of(name)) for name in names]
+    parts += [fault.lines for name in names for fault in faults_in(source_of(name), task, method)]
+    parts += [[np.ravel(v).tolist() for v in c.inputs.values()] for c in requests(task, method)]
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+
+def programs_of(task: str, method: str) -> list[str]:
+    """Return the names of the programs without limits of a task and a method."""
+    names = [name for name in PROGRAMS if is_of(name, task, method)]
+    return [name for name in names if "def within(" not in source_of(name)]
+
+
+@np.errstate(all="ignore")  # changed programs divide by zero
+def build(task: str, method: str, notify: Callable[[str], None] = lambda text: None) -> Dictionary:
+    """Return the dictionary of a task and a method."""
+    cases, names = requests(task, method), programs_of(task, method)
+    base = Program(source_of(TASKS[task, method]))
+    right = [answer_of(base, method, case) for case in cases]
+    classes, functions = dict[bytes, list[tuple[Entry, FloatArray]]](), set[str]()
+    for name in names:
+        program = Program(source_of(name))
+        for entry, run in _changes(name, program, cases, method, functions):
+            row = _row(run, cases, right)
+            if row is None:
+                continue
+            equal = classes.setdefault((np.round(row / DISTINCT) + 0.0).tobytes(), [])
+            if not equal and not _is_stable(run, cases, right, row):
+                del classes[(np.round(row / DISTINCT) + 0.0).tobytes()]
+                continue
+            text = program.text_of(entry.function) if entry.function else ""
+            _add(equal, entry._replace(text=text), row)
+        notify(f"{name}: {len(classes)} answers")
+    rows = sorted(
+        (pair for equal in classes.values() for pair in equal),
+        key=lambda pair: tuple(np.nan_to_num(pair[1].ravel(), nan=LARGEST)),
+    )
+    entries = [entry for entry, _ in rows]
+    return Dictionary(digest(task, method), entries, np.array([row for _, row in rows]))
+
+
+def _add(equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray) -> None:
+    """Add an entry to those that answer alike, the likeliest of which remain."""
+    count = (equal[0][0].count if equal else 0) + (len(entry.codes) < 2)
+    if all(entry[:6] != other[:6] for other, _ in equal):
+        equal.append((entry, row))
+    equal.sort(key=lambda pair: likelihood(pair[0]))
+    equal[:] = [(other._replace(count=count), row) for other, row in equal[:EQUAL]]
+
+
+Run = Callable[[Case], Mapping[str, Any]]
+
+
+def _changes(
+    name: str, program: Program, cases: Sequence[Case], method: str, functions: set[str]
+) -> Iterator[tuple[Entry, Run]]:
+    """Yield the changes of a program with their answers: while it has them, and no longer."""
+    passes, answer = {}, partial(answer_of, program, method)
+    for case in cases:
+        _, passes[case.name] = program.count_passes(partial(answer, case))
+    for codes in _codes(name, cases[0].task, method):
+        entry = Entry(name, codes)
+        with suppress(SyntaxError, ValueError):
+            wrong = entry.changed_program()
+            yield entry, partial(_within, wrong, passes, method)
+    program.observe(lambda: [answer(case) for case in cases])
+    if cases[0].task == FK:  # each program has conventions of its own
+        functions.clear()
+    functions -= {program.text_of(f) for f in IN_FORMS & program.names.keys()}
+    for mutant in program.mutants(functions):
+
+        def run(case: Case, mutant: Any = mutant) -> Mapping[str, Any]:
+            with program.changed(mutant, passes[case.name]):
+                return answer(case)
+
+        yield Entry(name, (), mutant.kind, mutant.function, mutant.right, mutant.wrong), run
+
+
+def _codes(name: str, task: str, method: str) -> Iterator[tuple[str, ...]]:
+    """Yield the known faults of a program, of forward kinematics also two at once."""
+    codes = [fault.code for fault in faults_in(source_of(name), task, method)]
+    yield from ((code,) for code in codes)
+    if task == FK and name == TASKS[task, ""]:
+        yield from combinations(codes, 2)
+
+
+def _within(
+    program: Program, passes: Mapping[str, int], method: str, case: Case
+) -> Mapping[str, Any]:
+    with program.within(passes[case.name]):
+        return answer_of(program, method, case)
+
+
+def _row(run: Run, cases: Sequence[Case], right: Sequence[Mapping[str, Any]]) -> FloatArray | None:
+    """Return the keys of all answers; None if all are right, or none has numbers."""
+    row = np.full((len(cases), len(OUTPUTS[cases[0].task])), np.nan)
+    for i, case in enumerate(cases):
+        with suppress(Exception):  # of a changed program any may come
+            row[i] = keys(run(case), right[i], case)
+    row[~(np.abs(row) < LARGEST)] = np.nan
+    is_wrong = np.nanmax(np.abs(row), initial=0.0) > DISTINCT
+    return row if is_wrong else None
+
+
+def _is_stable(
+    run: Run, cases: Sequence[Case], right: Sequence[Mapping[str, Any]], row: FloatArray
+) -> bool:
+    """Return whether answers to inputs that move a little move little."""
+    nudged = [replace(case, inputs=dict(map(_nudged, case.inputs.items()))) for case in cases]
+    moved = _row(run, nudged, right)
+    return moved is not None and bool(np.nanmax(np.abs(moved - row), initial=0.0) <= MOVED)
+
+
+def _nudged(item: tuple[str, Any]) -> tuple[str, Any]:
+    """Return an input, the numbers of an array moved by `NUDGE`, each otherwise."""
+    name, value = item
+    if not isinstance(value, np.ndarray) or value.dtype.kind != "f":
+        return item
+    return name, value * (1.0 + NUDGE * fractions(value.size, 9).reshape(value.shape))

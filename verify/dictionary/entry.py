@@ -1,0 +1,88 @@
+"""An entry of a dictionary, and the files of dictionaries."""
+
+import json
+import lzma
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from ..fault_programs import coded_faults, source_of
+from ..one_line.mutants import Program
+from ..one_line.right_programs import KINDS
+
+FOLDER = Path(__file__).parent
+
+
+class Entry(NamedTuple):
+    """A change of a right program: known faults, or another line of a function."""
+
+    program: str  # the name of the right program
+    codes: tuple[str, ...]  # of the known faults; () of a changed line
+    kind: str = ""  # of a changed line, a key of `one_line/faults.toml`
+    function: str = ""  # that the line is in
+    right: str = ""  # the line
+    wrong: str = ""  # the line in its place
+    text: str = ""  # the changed function
+    count: int = 1  # of the changed lines that answer alike
+
+    def changed_program(self) -> Program:
+        """Return the program with the change; raise ValueError or SyntaxError if it has no place.
+
+        The function has the passes of `Program` in its loops: it was written by one.
+        """
+        source = source_of(self.program)
+        for code in self.codes:
+            source = coded_faults()[code].planted_in(source)
+        program = Program(source)
+        if self.text:
+            exec(compile(self.text, self.program, "exec"), program.names)
+        return program
+
+
+def likelihood(entry: Entry) -> tuple[Any, ...]:
+    """Return what to sort entries by: known faults first, fewer, then likely kinds, short lines."""
+    kind = KINDS.index(entry.kind) if entry.kind else -1
+    length = abs(len(entry.right) - len(entry.wrong))
+    return not entry.codes, len(entry.codes), kind, length, len(entry.wrong), entry.program
+
+
+class Dictionary(NamedTuple):
+    """The entries of a task and a method, with a row of keys for each."""
+
+    digest: str  # of what it was computed from
+    entries: list[Entry]
+    keys: FloatArray  # (entry, request, output)
+
+    def write(self, path: Path) -> None:
+        """Write a file: a line of JSON, and the keys in single precision, compressed."""
+        keys = self.keys.astype("<f4")
+        columns = list(map(list, zip(*self.entries, strict=True)))
+        head = {"digest": self.digest, "shape": keys.shape, "columns": columns}
+        data = json.dumps(head, separators=(",", ":"), ensure_ascii=False).encode()
+        path.write_bytes(lzma.compress(data + b"\n" + _planes(keys), preset=9))
+
+
+def _planes(keys: Any) -> bytes:
+    """Return the bytes of numbers, all first bytes, then all second ones: they compress better."""
+    return np.ascontiguousarray(keys.reshape(-1, 1).view("u1").T).tobytes()
+
+
+def read(path: Path) -> Dictionary:
+    """Return the dictionary in a file."""
+    line, _, data = lzma.decompress(path.read_bytes()).partition(b"\n")
+    head = json.loads(line)
+    planes = np.frombuffer(data, "u1").reshape(4, -1)
+    keys = np.ascontiguousarray(planes.T).view("<f4").reshape(head["shape"]).astype(float)
+    entries = [
+        Entry(program, tuple(codes), *values)
+        for program, codes, *values in zip(*head["columns"], strict=True)
+    ]
+    return Dictionary(head["digest"], entries, keys)
+
+
+def file_of(task: str, method: str) -> Path:
+    """Return the file of a task and a method."""
+    return FOLDER / f"{method or task}.xz"

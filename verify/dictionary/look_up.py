@@ -1,0 +1,92 @@
+"""Look up the changes of right programs that answer a few requests as a solver does."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+from plumbob.text.sentence import Sentence, sentence
+
+from ..case import Case
+from ..contestant import Answer, Contestant, Exchange, Failure
+from ..fault_programs import source_of
+from ..gaps import difference
+from ..greeting import Greeting
+from ..one_line.mutants import Program
+from ..one_line.right_programs import answer_of, comparable
+from .entry import Dictionary, Entry, file_of, likelihood, read
+from .requests import TASKS, keys, requests, suitable
+
+# Keys differ by ten times the rounding of an answer: single precision loses three digits more.
+TOLERANCES = {"double": 1e-6, "single": 1e-4}
+# Equal requests get answers that differ by less, but for threads that add up in another order.
+SAME = 1e-6
+# The most candidates, which all cases have to decide between.
+MAX_CANDIDATES = 200
+UNSTEADY = sentence(
+    "Equal requests got different answers, also after a new start: no changed line is looked up."
+)
+
+
+class Proposals(NamedTuple):
+    """What a look-up proposes."""
+
+    entries: Sequence[Entry] = ()  # the likeliest first
+    is_wrong: bool = True  # whether the solver answers a request otherwise than right programs
+    hint: Sentence | None = None  # why nothing is looked up
+
+
+def look_up(
+    contestant: Contestant, task: str, method: str, greeting: Greeting, precision: str
+) -> Proposals | None:
+    """Return the changes that a new process of a solver answers like, None without a dictionary.
+
+    Each request is looked up alone as well: a second mistake may hide the first in another.
+    """
+    methods = [own for name, own in TASKS if name == task and method in (own, "")]
+    cases = [case for case in requests(task, method) if suitable(case, greeting)]
+    if not methods or not cases:
+        return None
+    contestant.close()
+    first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
+    if not all(map(_is_same, first, second)):
+        return Proposals(hint=UNSTEADY)
+    ranks, is_wrong = list[tuple[int, Entry]](), False
+    for own in methods:
+        base, tolerance = Program(source_of(TASKS[task, own])), TOLERANCES[precision]
+        names = [case.name for case in requests(task, method)]
+        rows = np.full((len(names), 2), np.nan)
+        for case, answer in zip(cases, first, strict=True):
+            rows[names.index(case.name)] = _keys_of(answer, case, base, own)
+        is_wrong |= bool(np.nanmax(np.abs(rows), initial=0.0) > tolerance)
+        ranks += _matches(read(file_of(task, own)), rows, tolerance)
+    ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
+    return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong)
+
+
+def _is_same(first: Answer | Failure, second: Answer | Failure) -> bool:
+    if isinstance(first, Failure) or isinstance(second, Failure):
+        return isinstance(first, Failure) and isinstance(second, Failure)
+    return difference(first.values, second.values) <= SAME
+
+
+def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -> FloatArray:
+    """Return the keys of an answer, NaN of a failure."""
+    if isinstance(answer, Failure):
+        return np.full(2, np.nan)
+    outputs = comparable(Exchange(case, answer, answer)).answer
+    assert isinstance(outputs, Answer)
+    return keys(outputs.values, answer_of(base, method, case), case)
+
+
+def _matches(dictionary: Dictionary, rows: FloatArray, tolerance: float) -> list[tuple[int, Entry]]:
+    """Return the entries with the keys of all answered requests, or (1) of a single wrong one."""
+    answered = np.isfinite(rows)
+    with np.errstate(invalid="ignore"):
+        gaps = np.abs(dictionary.keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
+        is_wrong = (np.abs(rows) > tolerance).any(axis=1)
+    is_alike = (gaps | ~answered).all(axis=2)
+    every, single = is_alike.all(axis=1), (is_alike & is_wrong).any(axis=1)
+    numbers = np.flatnonzero((every | single) & is_wrong.any())
+    return [(int(not every[i]), dictionary.entries[i]) for i in numbers]
