@@ -9,6 +9,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import MassSpring, State
 from plumbob.reference.skeleton import Skeleton, checked_skeleton
 
+# Round numbers: longer than any limb of a robot, and cloths of up to 22 particles a side.
 MAXIMUM_JOINTS = 50
 MINIMUM_PARTICLES, MAXIMUM_PARTICLES = 5, 500
 # Number of cases after which the sizes repeat.

@@ -20,6 +20,7 @@ from .engines.robot_engine import RobotEngine
 from .robots.models import moving_joints
 from .verdict import Comparison
 
+# Bodies of a random tree, and its random configurations.
 BODIES, CONFIGURATIONS = 8, 3
 BALLS = (1, 4, 5)  # bodies on balls or slides, others are on hinges or slides
 # Equalities of bodies as read by MuJoCo, with places for six random numbers.

@@ -15,9 +15,11 @@ from ..verdict import Comparison
 # A step of length h minimises E + M |x - y|²/(2 h²). The step reduces the distance to the
 # equilibrium by (h omega)^-2, less than 1e-5 even for the slowest mode.
 LONG_STEP = 1e3
+# Three steps leave less than 1e-15 of the distance, by Newton iterations to rounding.
 LONG_STEPS, ITERATIONS = 3, 25
 
-# The relaxation in MuJoCo: step [s], drag on each particle [N s/m], number of steps.
+# The relaxation in MuJoCo: step [s], drag on each particle [N s/m], number of steps. The motions,
+# of 20 and 180 seconds, must come to rest within the tolerances of their claims.
 ROPE = (0.005, 0.8, 4000)
 CLOTH = (0.03, 1.0, 6000)
 # The fall of a cloth, of two seconds: step [s], number of steps.

@@ -14,8 +14,9 @@ from .. import samples
 from ..verdict import Comparison
 from .integrators import SIMULATORS, mechanical_energy
 
-# Steps of the coarser of two runs, and the refinement of the accurate solution, of order 4.
+# Steps of the coarser of two runs.
 STEPS = 40
+# Of the accurate solution: at order 4 its error is 8**-4 of the error in as many steps.
 REFINEMENT = 8
 
 

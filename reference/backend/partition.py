@@ -14,6 +14,7 @@ from ..arguments import IndexArray
 
 # The fewest springs for which a second thread is worth while.
 LARGE = 1_000_000
+# The same for any number of cores, for the same bits; up to as many cores find work.
 REGIONS = 32
 
 

@@ -13,6 +13,7 @@ from ..quaternion import IDENTITY, between, magnitude, normalised
 from ..skeleton import Skeleton
 from .xml import Element
 
+# A round number far above every known robot: a hostile file ends here.
 MAX_JOINTS = 10_000
 
 Vector = tuple[float, float, float]

@@ -15,6 +15,7 @@ from .. import arguments
 from ..arguments import LARGEST_COORDINATE
 from .source import read_text, warn
 
+# A round number, ten elements for each of the most joints of a robot.
 MAX_ELEMENTS = 100_000
 # The limit of TinyXML2, the parser of MuJoCo and ROS.
 MAX_DEPTH = 500

@@ -37,18 +37,19 @@ from ..sparse.linear_solver import Factor, factorize
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
-# Computing a term of the gradient takes at most 27 roundings of EPS/2 each, an entry of a spring's
-# block at most 60. The norm of a block is at most three times its largest entry.
+# A term of the gradient takes at most 27 roundings of EPS/2 each: 27 / 2 < 16.
 GRADIENT_ROUNDING = 16
+# An entry of a spring's block takes at most 60, and the norm of a block is at most three times its
+# largest entry: 3 * 60 / 2 < 128.
 HESSIAN_ROUNDING = 128
 # Factor to cover the rounding errors of the bounds themselves, for millions of particles.
 SLACK = 1.0 + 1e-8
 # The norm of the third derivative of the length |p| is this over |p|².
 THIRD_DERIVATIVE = 2.0 / math.sqrt(3.0)
-# Least length [m] to divide by.
+# Least length [m] to divide by: its square is above the smallest normal number, 2.2e-308.
 TINY = 1e-150
 # The first shift tried as a lower bound of the smallest eigenvalue, relative to its estimate, and
-# the relative accuracy of the estimate.
+# the relative accuracy of the estimate. The shift leaves out twice the error of the estimate.
 FIRST_SHIFT, ESTIMATE_TOLERANCE = 0.98, 1e-2
 
 

@@ -10,7 +10,9 @@ import numpy as np
 from ..arguments import FloatArray
 from .objective import Iterate, Objective
 
-ARMIJO = 1e-4  # least decrease relative to the one predicted by the slope
+# Least decrease relative to the slope's prediction, the usual choice (Nocedal & Wright 2006, 3.1).
+ARMIJO = 1e-4
+# The last length is 1e-12 of the step: a shorter one changes positions by rounding only.
 HALVINGS = 40
 
 

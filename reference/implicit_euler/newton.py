@@ -32,7 +32,9 @@ from .factor_cache import hessian_factor
 from .line_search import line_search
 from .objective import Iterate, Objective
 
-FIRST_SHIFT = 1e-2  # times M
+# Shifts of an indefinite Hessian, times M. Growth outruns decay, for few factorisations. Near a
+# minimum there is no shift, so none changes the limit of a converging search.
+FIRST_SHIFT = 1e-2
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
 

@@ -24,6 +24,7 @@ from .objective import Iterate, Objective
 
 LARGEST_TOLERANCE = 0.1  # of the error of a step, relative to the step
 TOLERANCE_FACTOR = 0.3  # times the square root of the relative gradient
+# A step ended here is still a direction of descent, for the line search to shorten.
 CG_ITERATION_LIMIT = 500
 
 

@@ -30,7 +30,7 @@ from .mechanism import (
     update_forward_kinematics,
 )
 
-FULL_CIRCLE = 2.0 * math.pi
+FULL_CIRCLE = 2.0 * math.pi  # [rad]
 # A rotation by less [rad] has no axis to be made the long way round.
 LEAST_TURN = 1e-3
 # The step of a joint with followers is halved at most so often.

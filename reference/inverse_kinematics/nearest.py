@@ -20,7 +20,7 @@ from .solve import solve_checked
 
 # The order of the norm of the displacement, of NumPy, by preference.
 PREFERENCES = {"nearest": 2.0, "nearest_linf": np.inf}
-REVOLUTION = 2.0 * np.pi
+REVOLUTION = 2.0 * np.pi  # [rad]
 
 
 def nearest_solution(

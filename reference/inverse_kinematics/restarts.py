@@ -29,7 +29,7 @@ COUNT, STATE, COST, WAIT, MILESTONE, SINCE, LIMIT = range(7)
 # Rows behind the rows of attempts, of progress and of saved states: the best end of a phase, the
 # start, and the best attempt. In the last row iterations are the sum over all attempts.
 BEST_PHASE, START, BEST = -3, -2, -1
-SPARE_ROWS = 3
+SPARE_ROWS = 3  # their number
 INFINITY = math.inf
 # Columns of Result.figures: the largest distance [m] and angle [rad] from effector to target, the
 # number of iterations, and the value of the outcome. Then the merit [m], and the distance above the

@@ -81,7 +81,8 @@ from .restarts import (
 # A start is stuck if it stalls within so few iterations away from its target. An example is a
 # straight chain, perhaps folded since, with its target on its own line.
 STUCK = 6
-# Out of reach an error has stalled if it changes by no more than this share of the tolerance.
+# Out of reach an error has stalled if it changes by no more than this share of the tolerance. Where
+# an iteration gains a ten-thousandth of what is left, a ten-thousandth of the tolerance remains.
 FAR_MARGIN = 1e-8
 # A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)

@@ -27,6 +27,7 @@ from .mechanism import (
 from .problem import RESTARTS, Target
 from .tasks import Configuration, FrameTask, IKTask, configuration
 
+# The default, twice that of `solve_ik`: exact tasks take several descents.
 MAX_ITERATIONS = 200
 # The first damping and the largest, over the largest diagonal entry of J J' at first.
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12

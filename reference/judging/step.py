@@ -23,6 +23,7 @@ from ..outcome import Outcome
 
 # The smallest: only rounding stops Newton's method.
 TOLERANCE = SMALLEST_POSITIVE
+# Five times Newton's default: a step that needs more has no x*, and no error.
 MAX_ITERATIONS = 500
 
 

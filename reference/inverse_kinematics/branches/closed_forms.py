@@ -42,6 +42,7 @@ from .subproblems import (
     weighted_sum,
 )
 
+# As many as a pose has equations.
 HINGES = 6
 WRIST, PARALLEL = 0, 1
 FORMS = "spherical wrist", "three parallel axes"

@@ -8,21 +8,24 @@ import math
 
 from ...quaternion import add, cross, dot, scale, subtract
 
-# Coefficients up to this are zero, relative to coefficients of lengths and rotations near 1.
+# Coefficients up to this are zero, relative to coefficients of lengths and rotations near 1: some
+# thousand roundings, more than a chain of six rotations loses.
 ZERO = 1e-12
 # A quartic this near to zero at an extremum has a double root there.
 DOUBLE_ROOT = 1e-14
-# Angles within this of a double root [rad] are taken for the root: it has half the digits.
+# Angles within this of a double root [rad] are taken for the root: it has half the digits of
+# DOUBLE_ROOT.
 SAME_ROOT = 1e-7
 # A cosine beyond 1 by less is 1: an earlier angle may be off by as much.
 CLAMPED = 1e-7
-# The certainty of a number of roots: certain; in doubt; every angle is a root. In doubt with a
-# cosine within NEARLY_DOUBLE of 1, a quartic as near to zero, or vectors as near to the axis.
+# The certainty of a number of roots: certain; in doubt; every angle is a root.
 CERTAIN, DOUBTFUL, EVERY_ANGLE = range(3)
+# The number is in doubt with a cosine within this of 1, a quartic as near to zero, or vectors as
+# near to the axis: two roots are then within 2.8e-4 rad of each other. Doubt only starts a search.
 NEARLY_DOUBLE = 1e-8
 # A vector has no angle about an axis if its part across the axis is no longer than this.
 SINGULAR = 1e-7
-# The largest number of halvings of an interval with a root, from its length down to rounding.
+# Halvings of an interval with a root, from its length down to rounding, 2**-53, with some to spare.
 HALVINGS = 60
 
 
