@@ -8,8 +8,8 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 from ..peers import catalogue
 from .answers import SOLVED, is_time
@@ -39,7 +39,7 @@ class Drift(NamedTuple):
     @property
     def half_width(self) -> float:
         """Half the width of the 95 % interval around 0 [log]."""
-        return float(stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom) * self.sigma)
+        return float(scipy.stats.t.ppf((1 + CONFIDENCE) / 2, self.freedom) * self.sigma)
 
     @property
     def sentence(self) -> str:
@@ -49,7 +49,7 @@ class Drift(NamedTuple):
 
 def assumed_drift(half_width: float, source: str) -> Drift:
     """Return a drift of known size."""
-    return Drift(half_width / float(stats.norm.ppf((1 + CONFIDENCE) / 2)), 1e6, source)
+    return Drift(half_width / float(scipy.stats.norm.ppf((1 + CONFIDENCE) / 2)), 1e6, source)
 
 
 def ratio_of_medians(
@@ -74,7 +74,7 @@ def ratio_of_medians(
         math.sqrt(sum(squares)),
         sum(squares) ** 2 / (squares[0] ** 2 / freedom + squares[1] ** 2 / drift.freedom),
     )
-    chance = float(2 * stats.t.sf(abs(centre) / total.sigma, total.freedom))
+    chance = float(2 * scipy.stats.t.sf(abs(centre) / total.sigma, total.freedom))
     return _from_logs(centre, centre - total.half_width, centre + total.half_width, chance)
 
 
@@ -96,7 +96,7 @@ def ratio_of_pairs(old: Floats, new: Floats) -> TimeRatio:
     first, second = np.triu_indices(len(differences))
     means = np.sort((differences[first] + differences[second]) / 2)
     nonzero = differences[differences != 0]
-    chance = stats.wilcoxon(nonzero, method="exact").pvalue if len(nonzero) else 1.0
+    chance = scipy.stats.wilcoxon(nonzero, method="exact").pvalue if len(nonzero) else 1.0
     margin = _signed_rank_quantile(len(differences))
     low, high = (means[margin], means[-1 - margin]) if margin >= 0 else (-math.inf, math.inf)
     return _from_logs(float(np.median(means)), low, high, float(chance))

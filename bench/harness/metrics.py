@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import stats
 
 Floats = NDArray[np.float64]
 
@@ -109,7 +109,7 @@ def median_interval(values: Floats) -> Interval:
 @functools.cache
 def _coin_quantile(throws: int) -> int:
     """Return the greatest k with at most 2.5 % probability of k heads or fewer, else -1."""
-    return int(stats.binom.ppf((1 - CONFIDENCE) / 2, throws, 0.5)) - 1
+    return int(scipy.stats.binom.ppf((1 - CONFIDENCE) / 2, throws, 0.5)) - 1
 
 
 def mean_interval(values: Floats) -> Interval:
@@ -117,7 +117,7 @@ def mean_interval(values: Floats) -> Interval:
     count, middle = int(np.size(values)), mean(values)
     if count < 2:
         return Interval(middle, math.nan, math.nan)
-    half = float(stats.t.ppf((1 + CONFIDENCE) / 2, count - 1) * stats.sem(values))
+    half = float(scipy.stats.t.ppf((1 + CONFIDENCE) / 2, count - 1) * scipy.stats.sem(values))
     return Interval(middle, middle - half, middle + half)
 
 
@@ -150,7 +150,7 @@ def chance_of_pairs(a: Floats, b: Floats) -> float:
         return 1.0
     if size.min() == size.max():
         successes = int(np.sum(differences > 0))
-        return float(stats.binomtest(successes, len(differences)).pvalue)
+        return float(scipy.stats.binomtest(successes, len(differences)).pvalue)
     if len(differences) <= _FEW:
         signs = np.array(list(itertools.product((-1.0, 1.0), repeat=len(differences))))
         return float(np.mean(np.abs(signs @ size) >= total * (1.0 - 1e-12)))

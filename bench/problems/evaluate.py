@@ -13,7 +13,7 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from plumbob.reference.arguments import FloatArray
 
@@ -54,7 +54,7 @@ class PoseRequest(NamedTuple):
     @property
     def quaternion(self) -> FloatArray:
         """The rotation of the first effector, w last, (4,)."""
-        return Rotation.from_matrix(self.rotations[0]).as_quat()
+        return scipy.spatial.transform.Rotation.from_matrix(self.rotations[0]).as_quat()
 
 
 class Targets(NamedTuple):

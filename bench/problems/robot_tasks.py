@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from plumbob.reference.arguments import FloatArray
 
@@ -82,7 +82,7 @@ def _misses(part: TaskPart, actual: Any, target: Any, effector: int, base: int) 
         direction = x_goal + R_goal[:, 2] - x
         return [float(np.linalg.norm(direction / np.linalg.norm(direction) - R[:, 2]))]
     counts = np.array(part.axes) > 0.0
-    angle = Rotation.from_matrix(R_goal.T @ R).as_rotvec()
+    angle = scipy.spatial.transform.Rotation.from_matrix(R_goal.T @ R).as_rotvec()
     errors = R_goal.T @ (x - x_goal), angle
     return [float(np.linalg.norm(e[m])) for e, m in zip(errors, np.split(counts, 2), strict=True)]
 

@@ -200,15 +200,18 @@ def test_the_command_that_adds_peers_fits_how_plumbob_was_installed(monkeypatch,
 
 LOADS = """
 import sys
+from plumbob.bench.harness import isolation
 from plumbob.bench.peers import catalogue, ik, packages
+from plumbob.verify import verify
 
 print(*(name for name in sys.argv[1:] if name in sys.modules))
 """
 
 
 def test_the_peers_are_known_without_an_engine():
+    """Nor does a worker or `verify` import SciPy's geometry, which takes a second."""
     packages = {peer.package for peer in (*catalogue.PEERS, *catalogue.CLOTH_PEERS)} - {"plumbob"}
     owners = importlib.metadata.packages_distributions().items()
     engines = [name for name, distributions in owners if packages & set(distributions)]
-    command = [sys.executable, "-c", LOADS, "mujoco", "pinocchio", "numba", *engines]
+    command = [sys.executable, "-c", LOADS, "mujoco", "pinocchio", "numba", "scipy.spatial", *engines]
     assert not subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()

@@ -11,7 +11,7 @@ from itertools import pairwise, permutations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
@@ -219,7 +219,7 @@ def _numbers(rule: str, increments: FloatArray) -> FloatArray:
         return np.asarray(2.0 * increments[:, 1:] / increments[:, :1])
     if rule == "axis not unit":
         return _of_long_axes(increments)
-    rotations = Rotation.from_quat(increments, scalar_first=True)
+    rotations = scipy.spatial.transform.Rotation.from_quat(increments, scalar_first=True)
     angles = rotations.as_euler(rule, suppress_warnings=True)
     return np.asarray(angles[:, [rule.index(axis) for axis in "XYZ"]])
 

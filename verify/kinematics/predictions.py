@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray, IndexArray
@@ -82,22 +82,26 @@ def _read(inputs: Mapping[str, Any], switched: Switches) -> TextbookPose:
 
 def _through_euler_angles(local: FloatArray, order: str, other_order: str) -> FloatArray:
     """Return rotations with Euler angles of an order put together in another."""
-    angles = Rotation.from_quat(local, scalar_first=True).as_euler(order, suppress_warnings=True)
+    angles = scipy.spatial.transform.Rotation.from_quat(local, scalar_first=True).as_euler(
+        order, suppress_warnings=True
+    )
     columns = [order.upper().index(axis) for axis in other_order.upper()]
     if order[0] == order[2]:
         columns = [0, 1, 2]
-    rotations = Rotation.from_euler(other_order, angles[:, columns])
+    rotations = scipy.spatial.transform.Rotation.from_euler(other_order, angles[:, columns])
     return np.array(rotations.as_quat(scalar_first=True))
 
 
 def _as_euler_angles(local: FloatArray, order: str, is_degrees: bool) -> FloatArray:
     """Return rotations of Euler angles in degrees as if in radians, or of x, y, z as angles."""
     if is_degrees:
-        rotations = Rotation.from_quat(local, scalar_first=True)
+        rotations = scipy.spatial.transform.Rotation.from_quat(local, scalar_first=True)
         angles = np.degrees(rotations.as_euler(order, suppress_warnings=True))
     else:
         angles = local[:, 1:][:, ["XYZ".index(axis) for axis in order]]
-    return np.array(Rotation.from_euler(order, angles).as_quat(scalar_first=True))
+    return np.array(
+        scipy.spatial.transform.Rotation.from_euler(order, angles).as_quat(scalar_first=True)
+    )
 
 
 def _reordered(rotations: FloatArray, switched: Switches) -> FloatArray:

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
@@ -108,7 +108,9 @@ def _with_other_angles(
     """Return rotations whose roll, pitch and yaw are changed, or applied in another order."""
     turns = rotation.to_matrix(quaternions).reshape(-1, 3, 3)
     angles = scale * np.array([roll_pitch_yaw(R) for R in turns])[:, columns]
-    alternatives = Rotation.from_euler(order, angles).as_quat(scalar_first=True)
+    alternatives = scipy.spatial.transform.Rotation.from_euler(order, angles).as_quat(
+        scalar_first=True
+    )
     return np.array(alternatives).reshape(quaternions.shape)
 
 
