@@ -50,47 +50,6 @@ def extended_precision():
     return module
 
 
-# Long tests of the bench, by their names, until they carry their own marks.
-LONG = (
-    "test_branches.py::test_missing_and_false_solutions_are_counted",
-    "test_cloth_peers.py::test_a_motion_has_diverged_if_one_particle_is_ever_too_far",
-    "test_cloth_peers.py::test_the_converged_step_is_that_of_another_solver",
-    "test_cloth_peers.py::test_the_error_of_a_step_is_zero_at_the_answer",
-    "test_cloth_peers.py::test_the_truth_is_of_order_four",
-    "test_cloth_peers.py::test_the_truth_is_that_of_another_engines_runge_kutta",
-    "test_dask.py::test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none",
-    "test_dask.py::test_two_workers_give_the_same_tables",
-    "test_user_solvers.py::test_a_changed_file_is_measured_again_and_a_part_forgets_nothing",
-    "test_user_solvers.py::test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures",
-    "test_user_solvers.py::test_a_dry_run_measures_nothing",
-    "test_user_solvers.py::test_a_robot_solver_is_run_with_one_start_and_with_restarts",
-    "test_user_solvers.py::test_problems_of_a_python_file_stand",
-    "test_figures.py::test_no_legend_covers_the_data[20]",
-    "test_hostile_solvers.py::test_times_far_below_what_was_computed_are_not_ranked",
-    "test_isolation.py::test_exceptions_are_counted_apart_from_missing_answers[hangs",
-    "test_labels.py::test_no_labels_overlap",
-    "test_rerun.py::test_a_full_disk_leaves_nothing[files",
-    "test_rerun.py::test_a_rerun_beside_another_one_leaves_its_files",
-    "test_rerun.py::test_a_signal_leaves_no_worktree_no_file_and_no_process[2",
-    "test_rerun.py::test_a_solver_of_another_project_is_measured",
-    "test_run.py::test_kills_at_random_moments_lose_nothing_finished_and_repeat_nothing",
-    "test_show.py::test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean",
-    "test_show.py::test_the_cloth_by_your_steps_is_as_far_off_as_it_is",
-    "test_tuning.py::test_an_interrupted_search_goes_on_and_wrong_settings_solve_nothing",
-    "test_verify_command.py::test_full_disk_behind_the_screen_costs_no_file[right.py",
-    "test_verify_command.py::test_full_disk_behind_the_screen_costs_no_file[wrong",
-    "test_verify_command.py::test_letters_that_a_terminal_lacks_cost_no_output",
-)
-SAMPLED = {
-    "test_worker_death.py::test_a_death_at_any_moment_is_a_sentence_and_costs_no_other_job": 5,
-    "test_worker_death.py::test_a_death_before_the_job_is_read_is_a_sentence": 4,
-    "test_show.py::test_what_is_wrong_with_a_solver_is_said_in_a_sentence": 2,
-    "test_show.py::test_both_are_drawn_in_every_form": 2,
-    "test_user_solvers.py::test_a_broken_solver_loses_its_own_rows_only_and_says_why": 2,
-    "test_worker_death.py::test_a_death_after_the_last_message_costs_nothing": 2,
-}
-
-
 def quick_names(names, every, without=()):
     """Return each name of so many, of the names without some texts."""
     return [name for name in names if not any(text in name for text in without)][::every]
@@ -148,14 +107,3 @@ def pytest_collection_modifyitems(config, items):
     for mark, cases in cases_of(items):
         for item in set(cases) - set(sampled(cases, *mark.args, **mark.kwargs)):
             item.add_marker(pytest.mark.slow)
-    for name, stride in SAMPLED.items():
-        quick = [i for i in items if name in i.nodeid and not i.get_closest_marker("slow")]
-        for item in set(quick) - set(quick[::stride]):
-            item.add_marker(pytest.mark.slow)
-    absent = set(LONG)
-    for item in items:
-        if names := {name for name in LONG if name in item.nodeid}:
-            item.add_marker(pytest.mark.slow)
-            absent -= names
-    if absent and config.args == config.getini("testpaths"):
-        raise pytest.UsageError(f"LONG: no test has the name {min(absent)}")

@@ -29,6 +29,7 @@ def prepare_all(robot):
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")
 def test_missing_and_false_solutions_are_counted(importable):
     importable("faulty_lists", FAULTY)

@@ -213,5 +213,14 @@ def test_the_peers_are_known_without_an_engine():
     packages = {peer.package for peer in (*catalogue.PEERS, *catalogue.CLOTH_PEERS)} - {"plumbob"}
     owners = importlib.metadata.packages_distributions().items()
     engines = [name for name, distributions in owners if packages & set(distributions)]
-    command = [sys.executable, "-c", LOADS, "mujoco", "pinocchio", "numba", "scipy.spatial", *engines]
+    command = [
+        sys.executable,
+        "-c",
+        LOADS,
+        "mujoco",
+        "pinocchio",
+        "numba",
+        "scipy.spatial",
+        *engines,
+    ]
     assert not subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()

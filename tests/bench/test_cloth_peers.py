@@ -122,6 +122,7 @@ def test_the_highest_mode_is_one_and_none_is_higher(cloth):
 # The answers that others are held against.
 
 
+@pytest.mark.slow
 def test_the_truth_is_of_order_four_and_surer_than_any_error_measured():
     answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
     assert answers.order == pytest.approx(4.0, abs=0.15)
@@ -137,6 +138,7 @@ def test_the_truth_is_where_symplectic_euler_goes_at_order_one(cloth):
     assert np.log2(errors[0] / errors[1]) == pytest.approx(1.0, abs=0.1)
 
 
+@pytest.mark.slow
 def test_the_truth_is_that_of_another_engines_runge_kutta(cloth):
     """MuJoCo shares no code with the truth; its steps are those of the finest motion."""
     (peer,) = [peer for peer in catalogue.cloth_peers() if peer.title == "MuJoCo RK4"]
@@ -145,6 +147,7 @@ def test_the_truth_is_that_of_another_engines_runge_kutta(cloth):
     np.testing.assert_allclose(ends, true[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_the_converged_step_is_that_of_another_solver(cloth, monkeypatch):
     integrator = ImplicitEuler(
         cloth.system, h=FRAME, solver="lbfgs", tolerance=1e-12, max_iterations=2000
@@ -159,6 +162,7 @@ def test_the_converged_step_is_that_of_another_solver(cloth, monkeypatch):
 # The errors.
 
 
+@pytest.mark.slow
 def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite_beyond():
     answers = truth_of(falling_cloth(SIZE, STIFFNESS), 1)
     half = 0.5 * (answers.first.positions + answers.inertial)
@@ -169,6 +173,7 @@ def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite
         assert peers_cloth.step_error(np.full_like(half, lost), answers) == np.inf
 
 
+@pytest.mark.slow
 def test_a_motion_has_diverged_if_one_particle_is_ever_too_far():
     answers = truth_of(falling_cloth(SIZE, STIFFNESS), 2)
     assert peers_cloth.motion_error(answers.true, answers) == answers.unsure

@@ -209,6 +209,7 @@ def assert_same_tables(suites, executor, folder):
     assert results(folder / "two", suites, executor) == local
 
 
+@pytest.mark.slow
 def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
     few(arm=20, tracking=14)
     assert_same_tables(["tracking", "arm"], executor, tmp_path)
@@ -248,6 +249,7 @@ def pids(cluster):
         return list(client.run(os.getpid).values())
 
 
+@pytest.mark.slow
 def test_a_worker_killed_in_the_middle_costs_no_row_and_doubles_none(
     cluster, executor, few, tmp_path
 ):

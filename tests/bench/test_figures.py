@@ -163,6 +163,7 @@ def test_curves_of_different_lengths_are_no_curve():
     assert len(series("x", [1.0, np.nan, 3.0], [1.0, 2.0, np.inf]).x) == 1
 
 
+@pytest.mark.sample("2", without=["20"])
 @pytest.mark.parametrize("count", [2, 20])
 def test_no_legend_covers_the_data(records, count):
     """That no two texts meet is seen in the browser: `test_labels`."""

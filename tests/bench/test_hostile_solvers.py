@@ -232,6 +232,7 @@ for line in sys.stdin:
 """
 
 
+@pytest.mark.slow
 def test_times_far_below_what_was_computed_are_not_ranked(tmp_path, monkeypatch, worker):
     """Those of the first targets neither, which were claimed before it was seen."""
     monkeypatch.setattr(timing, "worker_process", lambda: worker)

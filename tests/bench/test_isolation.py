@@ -360,6 +360,7 @@ def test_a_solver_that_hangs_thrice_does_not_finish(suite, monkeypatch):
     assert (row["solved"], row["mark"].partition(";")[0]) == (None, "not finished")
 
 
+@pytest.mark.sample("raises")
 @pytest.mark.parametrize(("solver", "count"), [("hangs", 3), ("raises", 1)])
 def test_exceptions_are_counted_apart_from_missing_answers(suite, solver, count):
     block = suite[solver, "robots/iiwa14"]

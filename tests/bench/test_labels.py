@@ -87,6 +87,7 @@ def browser(tmp_path_factory):
     browser.close()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_labels_overlap_on_the_page(browser, folder, width):
     browser.open((folder / "index.html").as_uri(), width)
@@ -99,6 +100,7 @@ def test_no_labels_overlap_on_the_page(browser, folder, width):
         assert browser.run(FAULTS) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", WIDTHS)
 def test_no_labels_overlap_in_the_files(browser, folder, width):
     files = sorted((folder / "figures").glob("*.svg"))

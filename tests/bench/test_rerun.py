@@ -277,11 +277,11 @@ def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
 
 
 @pytest.mark.skipif(not Path("/proc").exists(), reason="reads the states of processes in /proc")
+@pytest.mark.sample(str(int(signal.SIGKILL)))
 @pytest.mark.parametrize(
     "number",
-    [signal.SIGINT, signal.SIGKILL,
-     *(pytest.param(one, marks=pytest.mark.slow) for one in (signal.SIGTERM, signal.SIGHUP))],
-)  # fmt: skip
+    [signal.SIGINT, signal.SIGKILL, signal.SIGTERM, signal.SIGHUP],
+)
 def test_a_signal_leaves_no_worktree_no_file_and_no_process(number, repository, temporary, start):
     """Ctrl-C goes to the terminal's whole group; what SIGKILL leaves, the next start removes."""
     measure_endlessly(repository)
@@ -303,6 +303,7 @@ def test_a_signal_leaves_no_worktree_no_file_and_no_process(number, repository, 
     assert list(temporary.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_rerun_beside_another_one_leaves_its_files(repository, temporary, start):
     measure_endlessly(repository)
     start()
@@ -312,6 +313,7 @@ def test_a_rerun_beside_another_one_leaves_its_files(repository, temporary, star
     assert (folder / "old" / "bench").is_dir()
 
 
+@pytest.mark.sample("archive")
 @pytest.mark.parametrize("content", [bytes(20_000), os.urandom(20_000)], ids=["files", "archive"])
 def test_a_full_disk_leaves_nothing(content, repository, temporary, start):
     """A limit on the size of files stands for a full disk; only zeros fit in as an archive."""
@@ -394,6 +396,7 @@ class Arm:
 """
 
 
+@pytest.mark.slow
 def test_a_solver_of_another_project_is_measured_at_both_revisions(capsys, tmp_path, monkeypatch):
     """In a package below src, which is not installed, and whose settings stand in another file."""
     package = tmp_path / "src" / "armkit"

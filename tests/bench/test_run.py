@@ -296,6 +296,7 @@ def without_times(folder):
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kills", [3, pytest.param(50, marks=pytest.mark.slow)], ids=lambda kills: f"{kills} kills"
 )

@@ -106,6 +106,7 @@ def test_a_solver_that_tracks_is_asked_for_the_whole_curve(tmp_path):
     assert scene.motions[0].errors.max() == 0.0
 
 
+@pytest.mark.slow
 def test_the_cloth_by_your_steps_is_as_far_off_as_it_is(tmp_path):
     system, start = scenes.lab_cloth()
     for change, least in (("", 0.0), (" + 1e-3", 1e-3)):
@@ -172,6 +173,7 @@ def test_a_curve_in_a_plane_is_seen_upright_and_almost_face_on(capsys, tmp_path,
     assert 0.9 < high / wide < 1.02
 
 
+@pytest.mark.slow
 def test_a_still_shows_the_whole_curve_by_each_solver_and_what_its_colours_mean(capsys, tmp_path):
     mine = file(tmp_path, "mine.py", IK.format(""))
     assert show(capsys, "heart", "--with", mine, "-o", "heart.svg")[0] == 0
@@ -228,6 +230,7 @@ FAULTS = {
 }  # fmt: skip
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize(("text", "arguments", "words"), FAULTS.values(), ids=FAULTS)
 def test_what_is_wrong_with_a_solver_is_said_in_a_sentence(
     capsys, tmp_path, text, arguments, words

@@ -112,6 +112,7 @@ def test_share_decides_then_time_then_the_default(hits, time, winner, monkeypatc
     assert tuning.best_trial(search, trials).settings == {"name": winner}
 
 
+@pytest.mark.slow
 def test_an_interrupted_search_goes_on_and_wrong_settings_solve_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(tuning, "SCREENED", 2)
     monkeypatch.setattr(tuning, "COUNT", 3)

@@ -97,6 +97,7 @@ def test_an_ik_solver_of_fifteen_lines_stands_in_tables_and_figures(folder, caps
     assert re.search(r"My FABRIK ranks \d of 3", " ".join(printed.split()))
 
 
+@pytest.mark.slow
 def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     """An explicit one takes no implicit step, so it stands in the table of motions only."""
     motion = ("--problem", "peers/motion/k1000")
@@ -159,6 +160,7 @@ def test_a_later_plain_run_keeps_records_of_entrants(folder, capsys, monkeypatch
     assert not after.superseded
 
 
+@pytest.mark.slow
 def test_a_changed_file_is_measured_again_and_a_part_forgets_nothing(folder, capsys):
     asked = ("ik", *SMALL, "--with", "my_ik.py", "--solver", "My FABRIK")
     bench(*asked)
@@ -219,6 +221,7 @@ BROKEN = {
 }
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("name", BROKEN)
 def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, capsys):
     head = "def inverse_kinematics(offsets, local_rotations):\n    "
@@ -294,6 +297,7 @@ def test_an_entry_point_takes_part_by_itself_and_a_broken_one_harms_nobody(
     assert "takes no part" in told.err
 
 
+@pytest.mark.slow
 def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
     (folder / "robot.py").write_text(ROBOT)
     bench("ik", "--quick", "--targets", "10", "--problem", "robots/ur5", "--with", "robot.py",
@@ -371,6 +375,7 @@ def test_a_misspelt_name_gets_a_suggestion(folder, capsys, words, said):
     assert said in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     asked = ("ik", *SMALL, "--with", "my_ik.py")
     assert bench(*asked, "--dry-run") == 0
@@ -388,6 +393,7 @@ def test_a_dry_run_measures_nothing_and_knows_how_long_it_takes(folder, capsys):
     assert {record.solver for record in records()} == {"ccd", "My FABRIK"}
 
 
+@pytest.mark.slow
 def test_problems_of_a_python_file_stand_in_the_same_tables(folder, capsys):
     (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
     words = ("--problem", "my_problems.py", "--with", "my_ik.py", "--solver", "My FABRIK")

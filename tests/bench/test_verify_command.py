@@ -377,6 +377,7 @@ def test_only_laws_need_pytest():
     assert "forward_kinematics(" in run.stdout
 
 
+@pytest.mark.slow
 def test_letters_that_a_terminal_lacks_cost_no_output():
     ascii_terminal = {"PYTHONIOENCODING": "ascii"}
     run = run_python("-c", CODE, "verify", "--list", "--lang", "zh", environment=ascii_terminal)
@@ -384,6 +385,7 @@ def test_letters_that_a_terminal_lacks_cost_no_output():
     assert "forward_kinematics(parents, offsets, local_rotations)" in run.stdout
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("solver", ["right.py", "wrong.py"])
 def test_full_disk_behind_the_screen_costs_no_file(folder, solver):
     with Path("/dev/full").open("w") as full:
