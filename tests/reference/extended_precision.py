@@ -82,19 +82,6 @@ def stiffness(springs, x, *, geometric=True):
     return blocks.reshape(3 * n, 3 * n)
 
 
-def damper_forces(system, state):
-    """-c ((v_i - v_j)·u) u, pins at rest."""
-    x, v = wide(state.positions), wide(state.velocities)
-    v[~system.free] = mpmath.mpf(0)
-    total = wide(np.zeros(x.shape))
-    for (i, j), c in zip(system.springs, system.dampings, strict=True):
-        p = x[i] - x[j]
-        pull = mpmath.mpf(c) * np.sum((v[i] - v[j]) * p) / np.sum(p * p) * p
-        total[i] -= pull
-        total[j] += pull
-    return total
-
-
 class Step:
     """g of one step, 1/2 (x - y)' M (x - y) + h² E(x)."""
 

@@ -73,12 +73,6 @@ def test_the_star_visits_every_second_of_five_points():
     np.testing.assert_allclose(np.linalg.norm(corners, axis=-1), 0.4)
 
 
-def test_the_plumb_bob_is_very_unevenly_sampled_and_in_strokes():
-    spacing = gaps(curves["plumb_bob"]())
-    assert spacing.max() > 100 * np.median(spacing)
-    assert spacing.min() < np.median(spacing) / 100
-
-
 # ---- resampling
 
 
@@ -146,18 +140,3 @@ def test_resampled_points_lie_on_the_curve(backend):
     x, y, _ = even.T
     assert (((y == 0) & (x <= 1)) | ((x == 1) & (y <= 2))).all()
     assert len(even) == 12
-
-
-@pytest.mark.parametrize(
-    ("points", "spacings", "message"),
-    [
-        (np.zeros((0, 3)), (1.0, 2.0), "curve: expected at least one point, got none"),
-        (np.zeros((4, 2)), (1.0, 2.0), r"curve: expected shape \(point, 3\), got \(4, 2\)"),
-        ([[0.0, np.nan, 0.0]], (1.0, 2.0), "curve: expected finite numbers"),
-        (np.zeros((4, 3)), (0.0, 2.0), "min_spacing: expected a number greater than 0, got 0.0"),
-        (np.zeros((4, 3)), (1.0, 1.9), "max_spacing: expected a number of at least 2, got 1.9"),
-    ],
-)
-def test_bad_input_is_named(points, spacings, message):
-    with pytest.raises(ValueError, match=message):
-        resample(points, min_spacing=spacings[0], max_spacing=spacings[1])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler, factor_cache
-from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import factor
 
 h = 0.05
@@ -91,18 +90,3 @@ def test_an_unused_factor_leaves_the_cache(network, analyses):
         assert not factor_cache._by_pattern
         assert not factor_cache._by_matrix
     assert len(analyses) == 2
-
-
-def test_the_factor_is_that_of_the_matrix(network, rng, backend):
-    system, b = network[0], rng.standard_normal((7, 3))
-    kept = factor_cache.global_factor(system, h)
-    for step in (h, 2 * h):
-        x = factor_cache.global_factor(system, step).solve(b)
-        np.testing.assert_allclose(global_matrix(system, step) @ x, b, rtol=0, atol=1e-13)
-    np.testing.assert_allclose(global_matrix(system, h) @ kept.solve(b), b, rtol=0, atol=1e-13)
-
-
-def test_the_pattern_of_a_matrix_cannot_be_changed_for_others(network):
-    matrix = global_matrix(network[0], h)
-    with pytest.raises(ValueError, match="read-only"):
-        matrix.indices[0] = 1

@@ -54,13 +54,6 @@ def test_pins_end_with_their_displacement_over_h(hung, step, backend):
     np.testing.assert_allclose(after.velocities[[2, 5]], expected, rtol=1e-15)
 
 
-def test_pins_that_stay_need_no_path(hung, step):
-    system, state, _ = hung
-    one, other = (step(system, state, h, None, pins) for pins in (None, state.positions[[2, 5]]))
-    np.testing.assert_array_equal(one.positions, other.positions)
-    np.testing.assert_array_equal(one.velocities, other.velocities)
-
-
 def test_a_world_that_moves_evenly_is_like_one_at_rest(hung, rng, step, backend):
     """Galileo's principle, with dampers, with pins that move with the frame."""
     system, state, pins_at = hung
@@ -113,26 +106,8 @@ def test_gauss_newton_linearises_where_the_pins_start(hung, rng, backend):
     np.testing.assert_allclose(after.velocities, expected, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", STEP_SOLVERS)
-def test_a_used_integrator_takes_pins_like_a_fresh_one(hung, name):
-    system, state, pins_at = hung
-    used = ImplicitEuler(system, h=h, solver=name)
-    middle = used.step(state, None, pins_at).state
-    for pins in (pins_at + DISPLACEMENT, None):
-        again = used.step(middle, None, pins)
-        fresh = ImplicitEuler(system, h=h, solver=name).step(middle, None, pins)
-        np.testing.assert_array_equal(again.state.positions, fresh.state.positions)
-        np.testing.assert_array_equal(again.history, fresh.history)
-
-
 def test_a_system_that_is_all_pins_goes_where_it_is_taken(step, backend):
     system = MassSpring([1.0, 0.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
     pins_at = 2 * np.eye(3)[:2]
     after = step(system, State(np.eye(3)[:2], np.ones((2, 3))), h, None, pins_at)
     np.testing.assert_array_equal(after.positions, pins_at)
-
-
-def test_a_system_without_pins_takes_an_empty_path(network, altered, step):
-    system = altered(network[0], pinned=())
-    one, other = (step(system, network[1], h, None, pins) for pins in (None, np.empty((0, 3))))
-    np.testing.assert_array_equal(one.positions, other.positions)

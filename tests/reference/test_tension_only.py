@@ -71,17 +71,6 @@ class TestKink:
         assert just_taut[0, 0] == pytest.approx(4.0, rel=1e-15)
 
 
-class TestDampersApart:
-    def test_it_is_the_same_system(self, network, backend):
-        system, state = network
-        apart = system.with_separate_dampers
-        damped_ropes = apart.tension_only & (apart.dampings > 0)
-        assert not damped_ropes.any()
-        assert (apart is system) == (not system.tension_only.any())
-        expected = forces(system, state)
-        np.testing.assert_allclose(forces(apart, state), expected, rtol=0, atol=1e-13)
-
-
 class TestStep:
     def test_a_slack_net_falls_freely(self, backend):
         """Folded to three quarters of its size, so that no rope becomes taut in the step."""

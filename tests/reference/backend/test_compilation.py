@@ -1,15 +1,12 @@
 """What is told of a compilation, and what is compiled."""
 
-import contextlib
 import gc
-from types import SimpleNamespace
 
 import numba
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
-from plumbob.reference import IK_SOLVERS
 from plumbob.reference.backend import compiled, linking
 from plumbob.reference.backend.compilation import on_compile
 
@@ -60,24 +57,10 @@ def test_the_garbage_collector_rests_while_compiling():
     assert seen == [(True, False), (False, True)]
 
 
-def test_a_collector_that_was_off_stays_off():
-    gc.disable()
-    try:
-        compiled.Kernel(fresh(polynomial))(2.0)
-        assert not gc.isenabled()
-    finally:
-        gc.enable()
-
-
 def test_the_collector_works_again_after_a_kernel_that_cannot_be_compiled():
     with pytest.raises(TypingError):
         compiled.Kernel(fresh(polynomial))("two")
     assert gc.isenabled()
-
-
-def test_kernels_are_called_what_the_user_calls_them():
-    assert IK_SOLVERS["ccd"].chain.label == "ccd for chains"
-    assert IK_SOLVERS["levenberg_marquardt"].mechanism.label == "levenberg_marquardt for mechanisms"
 
 
 def callee_of(kernel, inlined_size=compiled.INLINED_SIZE):
@@ -116,23 +99,6 @@ def test_this_numba_is_of_a_series_that_the_linker_is_tested_with():
     assert linking.is_supported()
 
 
-@pytest.mark.parametrize("version", ["0.61.2", "0.62.0"])
-def test_functions_are_simplified_by_the_passes_of_each_series(version, monkeypatch):
-    """Before 0.62 numba makes passes for a module, since then for each function."""
-    simplified = []
-    passes = SimpleNamespace(
-        initialize=lambda: None, finalize=lambda: None, run=lambda name, *_: simplified.append(name)
-    )
-    new = {"_function_pass_manager": lambda: (passes, "builder")}
-    old = {"_function_pass_manager": lambda module: contextlib.nullcontext(passes)}
-    codegen = SimpleNamespace(_data_layout="", **(old if version == "0.61.2" else new))
-    functions = [SimpleNamespace(name=name, is_declaration=name == "c") for name in "acb"]
-    monkeypatch.setattr(numba, "__version__", version)
-    library = SimpleNamespace(_codegen=codegen)
-    linking.LinkedLibrary._optimize_functions(library, SimpleNamespace(functions=functions))
-    assert [function.name for function in simplified] == ["a", "b"]
-
-
 @pytest.mark.parametrize("version", ["0.60.3", "0.99.0", "1.2.0rc1"])
 def test_another_numba_compiles_as_ever(version, monkeypatch):
     monkeypatch.setattr(numba, "__version__", version)
@@ -145,14 +111,6 @@ def test_another_numba_compiles_as_ever(version, monkeypatch):
 @pytest.mark.parametrize(("size", "inlined"), [(10**6, True), (0, False)])
 def test_a_large_callee_in_several_places_is_not_copied(size, inlined):
     assert callee_of(fresh(polynomial), size).targetoptions["forceinline"] == inlined
-
-
-def once(x):
-    return power(x, 2)
-
-
-def test_a_callee_in_one_place_is_inlined_whatever_its_size():
-    assert callee_of(fresh(once), 0).targetoptions["forceinline"]
 
 
 def test_numbers_are_the_same_however_it_is_compiled():

@@ -217,31 +217,6 @@ def test_products_are_rounded_before_they_are_added(backend):
     assert compiled.Kernel(rounded_twice)(x, x * x) == 0.0
 
 
-def summed(values):
-    s = 0.0
-    for value in values:
-        s += value
-    return s
-
-
-def test_sums_are_added_in_order(backend):
-    """Partial sums, as vector instructions would make them, give another last digit."""
-    values = np.array([1.0, 1e16, -1e16, 1.0] * 8)
-    expected = 0.0
-    for value in values.tolist():
-        expected += value
-    assert compiled.Kernel(summed)(values) == expected
-
-
-def quotient(values):
-    return values[0] / values[1]
-
-
-def test_division_by_zero_is_infinite_as_in_numpy(backend):
-    with np.errstate(divide="ignore"):
-        assert compiled.Kernel(quotient)(np.array([1.0, 0.0])) == np.inf
-
-
 EDITS = {
     "constant of a callee": ("SCALE = 2.0", "SCALE = 5.0"),
     "code of a callee": ("return x * SCALE", "return x * SCALE + 1.0"),

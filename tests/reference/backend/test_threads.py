@@ -98,14 +98,6 @@ def test_an_interrupt_reaches_the_caller_and_drops_what_has_not_begun(request):
     assert len(begun) == 2
 
 
-def test_threads_that_are_gone_are_replaced():
-    """As in a process that was forked from ours."""
-    with set_num_threads(2):
-        slices_of(100, minimum=1)
-        parallel._pools[2][0].shutdown()
-        assert len(slices_of(100, minimum=1)) == 2 * SLICES_PER_CORE
-
-
 def test_the_count_in_force_ends_with_its_block():
     with set_num_threads(2), set_num_threads(1):
         pass
@@ -120,9 +112,3 @@ def test_the_count_in_force_ends_with_its_block():
 def slices_wanted():
     many = parallel._all_cores()
     return 1 if many == 1 else SLICES_PER_CORE * many
-
-
-@pytest.mark.parametrize("count", [0, -1, 1.5, True, "two"])
-def test_a_count_that_is_none_is_refused(count):
-    with pytest.raises(ValueError, match="count: expected an integer"):
-        set_num_threads(count).__enter__()

@@ -5,11 +5,7 @@ import pytest
 
 from plumbob import Articulation, Mimic, Skeleton, Target, all_solutions, solve_ik
 from plumbob.reference import forward_kinematics, rotation, set_backend
-from plumbob.reference.inverse_kinematics.branches import settle, subproblems
-from plumbob.reference.inverse_kinematics.branches.arms import arms_of
 from plumbob.reference.inverse_kinematics.branches.closed_forms import FORMS
-from plumbob.reference.inverse_kinematics.problem import check_numbers, checked_targets
-from plumbob.reference.inverse_kinematics.solve import target_rows
 
 WRIST, PARALLEL = FORMS
 X, Y, Z = np.eye(3)
@@ -181,27 +177,6 @@ def test_a_solution_just_beyond_a_limit_leaves_the_list_in_doubt(beyond, is_list
     assert len(solutions.coordinates) > 0
 
 
-def settled(arm, target, candidates):
-    """Return the rows that the candidates come to, and the number of doubtful ones."""
-    mechanism = arms_of(arm, arm.joint_count - 1, None).members[0].mechanism
-    rows = np.empty((len(candidates), len(mechanism.columns) + settle.FIGURES))
-    (pose,) = check_numbers(checked_targets(arm, target, None))
-    count, doubts = settle.settle_candidates(
-        tuple(mechanism), candidates, target_rows([pose], ()), rows
-    )
-    return rows[:count], doubts
-
-
-def test_candidates_return_from_beyond_their_limits_if_they_are_near():
-    """Newton's method brings all of them back to q, which is at the limit of its elbow."""
-    q = np.array([0.3, -1.0, 0.8, 0.5, 0.9, 0.4])
-    arm = arm_of(*ARMS["UR5"][:2], upper=[LIMIT, LIMIT, q[2], *[LIMIT] * 4])
-    for excess, count in ((0.0, 1), (1e-8, 1), (0.05, 1), (0.09, 1), (0.11, 0)):
-        rows, doubts = settled(arm, target_of(arm, q), q[None] + excess * np.eye(6)[2:3])
-        assert (len(rows), doubts) == (count, 0)
-        assert differences(rows[:, :6], q[None]).max(initial=0.0) < SAME
-
-
 @pytest.mark.parametrize("bend", [2e-6, 1e-4])
 def test_solutions_that_nearly_meet_are_two(bend):
     """The elbow of a nearly straight arm bends either way, and candidates come to both."""
@@ -210,17 +185,6 @@ def test_solutions_that_nearly_meet_are_two(bend):
     listed = all_solutions(arm, target_of(arm, q)).coordinates
     near = listed[differences(listed, q[None])[:, 0] < 10.0 * bend]
     np.testing.assert_allclose(np.sort(near[:, 2]), [-bend, bend], rtol=1e-2)
-
-
-@pytest.mark.parametrize("share", [0.9, 1.1])
-def test_coordinates_are_one_solution_to_a_millionth(share):
-    """Of a radian, also across whole turns, and of the reach, here of 2 m."""
-    joints = Articulation(Skeleton([-1, 0], np.zeros((2, 3))), ["hinge", "slide"]).joints
-    for a in ([0.0, 0.0], [0.5, -0.3]):
-        for step in ([share * 1e-6, 0.0], [-share * 1e-6, 0.0], [2.0 * LIMIT - share * 1e-6, 0.0],
-                     [0.0, 2.0 * share * 1e-6]):  # fmt: skip
-            b = np.add(a, step)
-            assert settle.is_same(joints, np.array(a), b, 2.0) is (share < 1.0)
 
 
 def test_angles_are_the_nearest_to_the_middle_of_the_limits(rng):
@@ -262,16 +226,6 @@ def test_whole_turns_within_the_limits_are_added(limits, named, rng):
     assert (apart + 9.0 * np.eye(len(rows))).min() > SAME
     if np.isfinite(upper):
         assert np.abs(rows - q).max(axis=1).min() < SAME
-
-
-def test_limits_that_are_whole_turns_apart_keep_both_ends():
-    arm = arm_of(*ARMS["UR5"][:2], lower=-TURN, upper=TURN)
-    q = np.array([0.0, -1.0, 0.8, 0.5, 0.7, 0.4])
-    solutions = all_solutions(arm, target_of(arm, q))
-    near = differences(solutions.coordinates, q[None])[:, 0] < SAME
-    rows = np.array(list(solutions._replace(coordinates=solutions.coordinates[near]).with_turns()))
-    assert len(rows) == 3 * 2**5
-    np.testing.assert_allclose(np.unique(np.round(rows[:, 0], 6)), [-TURN, 0.0, TURN], atol=1e-5)
 
 
 def test_joints_that_do_not_turn_keep_their_angles(rng):
@@ -537,46 +491,3 @@ def test_misuse_is_named(changes, message):
 def test_misuse_of_a_search_is_named_where_a_closed_form_needs_none():
     with pytest.raises(ValueError, match=r"^restarts: expected"):
         all_solutions(arm_of(*ARMS["UR5"][:2]), POSE, restarts=0)
-
-
-def conic(p, angle):
-    waves = np.cos(angle), np.sin(angle), np.cos(2.0 * angle), np.sin(2.0 * angle)
-    return p[0] + np.tensordot(p[1:], np.array(waves), 1)
-
-
-def conic_angles(p):
-    roots = np.empty((24, 2))
-    count, status = subproblems.conic_roots(tuple(p), 0.0, roots, np.empty((5, 12)))
-    assert status != subproblems.EVERY_ANGLE
-    return np.arctan2(*roots[:count, ::-1].T)
-
-
-def test_roots_of_a_conic_on_the_circle_are_all_its_changes_of_sign(rng):
-    grid = np.linspace(-np.pi, np.pi, 4000)
-    for p in rng.standard_normal((50, 5)):
-        angles = conic_angles(p)
-        assert np.abs(conic(p, angles)).max(initial=0.0) < 1e-12
-        changes = np.diff(np.sign(conic(p, grid))) != 0
-        assert len(angles) == changes.sum()
-
-
-@pytest.mark.parametrize("angle", [0.0, 0.7, np.pi / 2, np.pi, -np.pi / 2, -2.0])
-def test_double_roots_of_a_conic_are_found(angle):
-    # (1 - cos(t - a)) (2 + cos(t - a)), which is zero and least at a alone
-    c, s = np.cos(angle), np.sin(angle)
-    p = [1.5, -c, -s, -0.5 * np.cos(2 * angle), -0.5 * np.sin(2 * angle)]
-    angles = conic_angles(p)
-    assert len(angles) > 0
-    assert np.abs(np.exp(1j * angles) - np.exp(1j * angle)).max() < 1e-6
-
-
-def test_roots_of_a_line_on_the_circle(rng):
-    roots = np.empty((2, 2))
-    for k, a, b in rng.standard_normal((50, 3)):
-        count, status = subproblems.line_roots(k, a, b, 0.0, roots)
-        assert (count, status) == (2 * (abs(k) < np.hypot(a, b)), subproblems.CERTAIN)
-        assert np.abs(k + roots[:count] @ [a, b]).max(initial=0.0) < 1e-14
-    assert subproblems.line_roots(1.0, 0.6, 0.8, 0.0, roots) == (1, subproblems.DOUBTFUL)
-    assert subproblems.line_roots(0.0, 0.0, 0.0, 0.0, roots) == (1, subproblems.EVERY_ANGLE)
-    assert subproblems.line_roots(0.1, 0.0, 0.0, 0.0, roots) == (0, subproblems.CERTAIN)
-    assert subproblems.line_roots(1e-10, 3e-9, 0.0, 0.0, roots) == (2, subproblems.EVERY_ANGLE)

@@ -6,7 +6,6 @@ import pytest
 from plumbob import Articulation, Skeleton, rotation, set_backend, solve_ik
 from plumbob.reference.inverse_kinematics.anderson import (
     DEPTH,
-    forget,
     mix,
     mixing_on,
     mixing_size,
@@ -79,18 +78,6 @@ def test_no_sweep_raises_the_error(model, backend, rng):
         assert rises.min() < 0.0
 
 
-@pytest.mark.parametrize("distance", [0.3, 0.9, 0.97, 1.05])
-def test_no_sweep_raises_the_error_of_a_long_chain(distance, rng):
-    n = 12
-    chain = Skeleton(range(-1, n), [[0.0, 0.0, 0.0], *[[0.0, 0.0, 1.0 / n]] * n])
-    with set_backend("python"):
-        solution = solve_ik(
-            chain, rotation.random(rng, n + 1), (distance, 0.0, 0.0), "anderson_ccd",
-            tolerance=1e-12, record=True, max_iterations=40,
-        )  # fmt: skip
-    assert np.diff(solution.history).max() <= 1e-14
-
-
 def test_a_batch_remembers_nothing_of_the_target_before(rng):
     chain = Skeleton(range(-1, 5), [[0.0, 0.0, 0.0], *rng.standard_normal((5, 3))])
     target, start = 3.0 * rng.standard_normal(3), rotation.random(rng, 6)
@@ -101,13 +88,3 @@ def test_a_batch_remembers_nothing_of_the_target_before(rng):
         alone = solve_ik(model, first.coordinates, target, "anderson_ccd", -1, max_iterations=7)
         np.testing.assert_array_equal(batch.coordinates[1], alone.coordinates)
         assert batch.iterations[1] > 0
-
-
-def test_what_is_forgotten_is_not_mixed(rng):
-    mixing = mixing_on(np.empty(mixing_size(3, DEPTH)), 3, DEPTH)
-    x = rng.standard_normal(3)
-    assert not mix(mixing, x)
-    mixing.start[:] = 0.5
-    assert mix(mixing, x)
-    forget(mixing)
-    assert not mix(mixing, x)

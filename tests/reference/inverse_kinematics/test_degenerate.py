@@ -144,20 +144,6 @@ def test_limits_without_width_hold_fast(solver, backend, rng, beyond_limits):
         assert solution.outcome is Outcome.CONVERGED  # by the one hinge that can move
 
 
-def test_no_iterations_leave_the_start_within_its_limits(
-    articulated, reachable, beyond_limits, moving_joints, rng, solver, backend
-):
-    model = articulated(["hinge", "ball", "slide", "ball"], 3)
-    targets, _ = reachable(model, rng, 2)
-    q = beyond_limits(model, rng)
-    solution = solve_ik(model, q, targets, solver, max_iterations=0)
-    assert solution.iterations == 0
-    expected, clamped = q.copy(), model.clamp(q)
-    for j in moving_joints(model, targets):
-        expected[model.coordinates_of(j)] = clamped[model.coordinates_of(j)]
-    np.testing.assert_allclose(solution.coordinates, expected, rtol=0, atol=1e-12)
-
-
 @pytest.mark.parametrize("kind", ["skeleton", "ball", "hinge"])
 def test_tolerance_zero_ends(kind, solver, chain_of_joints, rng):
     model = chain_of_joints("ball" if kind == "skeleton" else kind, rng)

@@ -19,8 +19,6 @@ from plumbob.reference.inverse_kinematics.ccd import descend, update_joint
 from plumbob.reference.inverse_kinematics.fabrik import (
     backward_pass,
     fabrik_update,
-    forward_joint,
-    update_joint_pose,
 )
 from plumbob.reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
 from plumbob.reference.inverse_kinematics.reduce import prepare
@@ -68,31 +66,6 @@ def test_no_update_of_a_joint_raises_the_cost(articulated, machine, reachable, k
     for _ in range(2):
         for _, before, after, _ in updates(ready):
             assert after <= before + ROUNDING
-
-
-@shared
-@with_examples
-@given(**TREES)
-def test_after_an_update_effectors_are_where_the_coordinates_put_them(
-    articulated, machine, reachable, kinds, seed
-):
-    """Joints below the one that moves are not placed yet; the effectors are."""
-    model, rng = articulated(kinds, seed), np.random.default_rng(seed)
-    targets, _ = reachable(model, rng, 2)
-    ready = machine(model, model.random(rng), targets)
-    count = len(ready.mechanism.joints)
-    for _, _, _, (positions, rotations) in updates(ready):
-        placed = machine(model, model.random(rng), targets)
-        placed.data.q[:] = ready.data.q
-        update_forward_kinematics(placed.mechanism, placed.data)
-        tips = placed.data.positions[count:], placed.data.rotations[count:]
-        np.testing.assert_allclose(positions[count:], tips[0], rtol=0, atol=ROUNDING)
-        turned = rotation.angle(_units(rotations[count:]), _units(tips[1]))
-        np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
-
-
-def _units(quaternions):
-    return quaternions / np.linalg.norm(quaternions, axis=-1, keepdims=True)
 
 
 @pytest.mark.parametrize("kind", ["hinge", "slide", "ball", "free"])
@@ -254,32 +227,6 @@ def test_a_pose_that_reaches_all_targets_is_a_fixed_point(
     np.testing.assert_allclose(ready.data.positions, before, rtol=0, atol=1e-9)
 
 
-@shared
-@with_examples
-@given(**TREES)
-def test_forward_each_joint_is_left_where_the_coordinates_put_it(
-    articulated, machine, reachable, kinds, seed
-):
-    """The joints below count on it; but for followers, which move again when their leader does."""
-    drawn, rng = articulated(kinds, seed), np.random.default_rng(seed)
-    model = Articulation(
-        drawn.skeleton, drawn.kinds, drawn.axes, frames=drawn.frames,
-        lower=drawn.lower, upper=drawn.upper, cones=drawn.cones,
-    )  # fmt: skip
-    targets, _ = reachable(model, rng, 2)
-    mechanism, target, data, workspace = machine(model, model.random(rng), targets)
-    backward_pass(mechanism, target, data, workspace.backward)
-    count = len(mechanism.joints)
-    for j in range(count):
-        update_joint_pose(mechanism.joints, data, workspace.backward, j)
-        forward_joint(mechanism, target, data, workspace, j)
-    positions, rotations = data.positions[:count].copy(), data.rotations[:count].copy()
-    update_forward_kinematics(mechanism, data)
-    np.testing.assert_allclose(positions, data.positions[:count], rtol=0, atol=ROUNDING)
-    turned = rotation.angle(_units(rotations), _units(data.rotations[:count]))
-    np.testing.assert_allclose(turned, 0.0, rtol=0, atol=1e-9)
-
-
 def test_fabrik_rotates_a_hinge_towards_its_child_s_backward_position_within_its_limits(backend):
     for upper, expected in ((2.0, 1.0), (0.4, 0.4)):
         arm = planar(1, lower=-2.0, upper=upper)
@@ -302,16 +249,3 @@ def test_what_a_joint_leaves_in_place_is_not_adjacent_to_it():
     assert not joints[1:].any()
     assert mechanism.moves[:, 0].all()
     assert effector.tolist() == [False, True, True, True]
-
-
-def test_the_reach_counts_links_and_not_the_root_s_offset(rng):
-    model = Articulation(
-        Skeleton([-1, 0, 1, 2], [[9.0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 0.5]]),
-        ["hinge", "fixed", "slide", "ball"],
-        lower=-0.25,
-        upper=0.75,
-    )
-    mechanism = prepare(model, (3,), (False,)).mechanism
-    merged = np.hypot(1.0, 2.0)
-    assert mechanism.reach == pytest.approx(merged + 0.5, abs=1e-15)
-    assert mechanism.effectors["reach"][0] == pytest.approx(merged + 0.5 + 0.75, abs=1e-15)

@@ -23,9 +23,7 @@ from plumbob.reference.inverse_kinematics.box_step import (
     lean,
     linearise_task,
     take_step,
-    turn_the_long_way,
 )
-from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.restarts import FIRST_PATIENCE
 
 COUNT = 150
@@ -145,22 +143,6 @@ def test_only_levenberg_marquardt_has_phases_and_a_track_has_none(arm, task):
 
 
 # ---- what the phases are made of
-
-
-def test_the_long_way_round_is_two_pi_less_the_angle_about_the_same_axis(arm, rng, machine):
-    pose = forward_kinematics(arm, arm.random(rng))
-    for _ in range(20):
-        target = Target(pose.positions[-1], pose.rotations[-1], 6, rng.uniform(0.5, 2.0))
-        mechanism, row, data, workspace = machine(arm, arm.random(rng), [target])
-        linearise_task(mechanism, row, data, workspace.system)
-        short = workspace.system.e.copy()
-        turn_the_long_way(mechanism, row, workspace.system)
-        unit = LEVER * mechanism.reach * np.sqrt(target.weight)
-        before, after = short[3:] / unit, workspace.system.e[3:] / unit
-        np.testing.assert_array_equal(workspace.system.e[:3], short[:3])
-        assert np.linalg.norm(before) + np.linalg.norm(after) == pytest.approx(2.0 * np.pi)
-        both = rotation.exponential(np.stack([before, after]))
-        assert rotation.angle(*both) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_a_leaning_step_comes_nearest_to_mid_range(rng, machine):

@@ -51,17 +51,3 @@ def test_a_copy_of_prepared_solves_has_arrays_of_its_own(model, duplicate):
         expected = solve_ik(model, start, target)
         np.testing.assert_array_equal(prepared.coordinates, expected.coordinates)
         assert prepared.figures[0] == expected.residual
-
-
-@pytest.mark.parametrize(
-    ("start", "target", "message"),
-    [
-        (np.zeros(6), np.zeros(3), "q: expected shape"),
-        (np.zeros(7), np.zeros(2), "target: expected shape"),
-        (np.full(7, np.nan), np.zeros(3), "q: expected"),
-        (np.zeros(7), np.full(3, np.inf), "target: expected"),
-    ],
-)
-def test_wrong_arguments_of_prepared_solves_are_named(start, target, message):
-    with pytest.raises(ValueError, match=message):
-        prepare_ik(ARM)(start, target)

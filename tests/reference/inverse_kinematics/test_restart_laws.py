@@ -1,7 +1,5 @@
 """Restarts never make an answer worse, and the best of the attempts is the one returned."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
@@ -18,12 +16,10 @@ from plumbob.reference import (
     solve_ik,
 )
 from plumbob.reference.inverse_kinematics import reduce
-from plumbob.reference.inverse_kinematics.anderson import mixing_on, mixing_size
-from plumbob.reference.inverse_kinematics.mechanism import LEVER, scatter
+from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.solve import solve_checked
-from plumbob.reference.inverse_kinematics.solve_mechanism import draw_mechanism
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.
@@ -244,61 +240,3 @@ def test_an_articulation_keeps_the_mechanisms_of_the_latest_seeds_only(monkeypat
     for seed in range(5):
         solve_ik(model, q, target, "ccd", restarts=1, seed=seed)
     assert len(model.mechanisms) == 5
-
-
-def hand_of_many_joints():
-    """Return two fingers with joints of every kind, some beyond two pi, and followers."""
-    rng = np.random.default_rng(4)
-    kinds = [
-        "hinge",
-        "hinge",
-        "slide",
-        "hinge",
-        "hinge",
-        "slide",
-        "ball",
-        "hinge",
-        "slide",
-        "hinge",
-    ]
-    links = Skeleton([-1, 0, 1, 2, 3, 2, 5, 6, 7, 8], 0.3 * rng.standard_normal((10, 3)))
-    lower = [-np.inf, 7.0, -0.2, -9.0, 0.1, 0.4, -0.5, -0.3, -np.inf, 6.5]
-    upper = [np.inf, 9.0, 0.7, 8.0, 0.6, np.inf, 0.9, 1.7, 5.0, np.inf]
-    mimics = {4: Mimic(3, -1e3, 0.2), 7: Mimic(3, 0.5, 0.1)}
-    axes = rng.standard_normal((10, 3))
-    return Articulation(
-        links, kinds, axes, lower=lower, upper=upper, cones=0.8, mimics=mimics
-    )  # fmt: skip
-
-
-@pytest.mark.parametrize("redraws_limbs", [False, True])
-def test_restarts_draw_outside_no_limit(machine, redraws_limbs):
-    """Coordinates as the restarts place them, from a start within the limits."""
-    model, count = hand_of_many_joints(), 40
-    rng = np.random.default_rng(5)
-    x, R = model.forward(model.random(rng))
-    targets = [Target(x[j] + 1.0, R[j], j) for j in (4, 9)]
-    q = model.clamp(model.random(rng))
-    mechanism, rows, data, _ = machine(model, q, targets)
-    prepared = prepare(model, (4, 9), (True, True), count, 8)
-    n = len(mechanism.columns)
-    state = SimpleNamespace(
-        mechanism=mechanism, data=data, mixing=mixing_on(np.zeros(mixing_size(n, 0)), n, 0),
-        restarts=prepared.restarts, effector_frames=prepared.effector_frames,
-        ranks=np.empty(count),
-    )  # fmt: skip
-    criteria = SimpleNamespace(redraws_limbs=redraws_limbs, distance=1e-4, angle=1e-4)
-    draws = []
-    for attempt in range(1, count + 1):
-        draw_mechanism(state, rows, criteria, attempt)
-        scatter(mechanism, data.q, q)
-        draws.append(q.copy())
-    draws = np.array(draws)
-    assert model.within_limits(draws).all()
-    for j in set(range(10)) - {6}:  # of the ball limits are kept to rounding
-        _, multiplier, shift = model.mimics.get(j, Mimic(j))
-        values = multiplier * draws[:, model.coordinates_of(j).start] + shift
-        rounding = 1e-12 * (j in model.mimics)
-        assert values.min() >= model.lower[j] - rounding
-        assert values.max() <= model.upper[j] + rounding
-    assert len(np.unique(draws, axis=0)) == count

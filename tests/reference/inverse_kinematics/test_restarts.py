@@ -1,14 +1,10 @@
 """Further attempts from random poses."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pytest
 
-from plumbob.reference import Outcome, Target, forward_kinematics, rotation, solve_ik
-from plumbob.reference.inverse_kinematics.mechanism import LEVER
+from plumbob.reference import Outcome, Target, forward_kinematics, solve_ik
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.solve_mechanism import rank_restarts, take_nearest
 
 
 @pytest.fixture
@@ -64,34 +60,6 @@ def test_one_restart_from_the_very_answer_arrives(arm, solver, backend, rng):
     np.testing.assert_allclose(solution.coordinates, random[1], rtol=0, atol=1e-15)
     other = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=12, max_iterations=0)
     assert other.outcome is Outcome.ITERATION_LIMIT
-
-
-def test_every_restart_is_taken_once_the_nearest_first(arm, poses, machine):
-    prepared = prepare(arm, (7, 3), (True, False), 9, 5)
-    targets = [
-        Target(poses.position[0], poses.rotation[0], 7),
-        Target(poses.position[1] / 2.0, None, 3),
-    ]
-    target = machine(arm, arm.neutral(), targets).target
-    state = SimpleNamespace(
-        mechanism=prepared.mechanism,
-        restarts=prepared.restarts,
-        effector_frames=prepared.effector_frames,
-        ranks=np.empty(9),
-    )
-    rank_restarts(state, target)
-    full = np.hstack([prepared.restarts, np.zeros((9, arm.coordinate_count))])[:, :8]
-    pose = forward_kinematics(arm, full)
-    errors = [pose.positions[:, t.effector] - t.position for t in targets]
-    distances = np.linalg.norm(errors, axis=2)
-    angles = rotation.angle(pose.rotations[:, 7], targets[0].rotation)
-    lever = LEVER * prepared.mechanism.reach
-    expected = np.max(distances, axis=0) + lever * 4.0 * np.sin(angles / 4.0)
-    np.testing.assert_allclose(state.ranks, expected, rtol=1e-12, atol=0)
-    taken = np.empty((9, len(prepared.mechanism.columns)))
-    for q in taken:
-        take_nearest(state, q)
-    assert (taken == prepared.restarts[np.argsort(expected)]).all()
 
 
 def test_restarts_follow_from_the_seed(arm, poses, rng):

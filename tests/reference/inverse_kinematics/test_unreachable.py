@@ -87,12 +87,6 @@ def test_where_nothing_is_proven_the_excess_is_the_residual(solver, chain_of_joi
     assert (solution.excess == solution.residual).all()
 
 
-def test_reachable_solves_keep_the_usual_limit(solver, rng):
-    arm, rest = scenes.lab_arm()
-    solution = solve_ik(arm, rest, [0.3, 0.2, 0.4], solver, tolerance=0.0)
-    assert solution.iterations <= 100
-
-
 def test_the_history_of_a_long_solve_is_whole(rng):
     arm, rest = scenes.lab_arm()
     targets = np.array([[3.0, 0.0, 4.0], [0.3, 0.2, 0.4]])
@@ -103,13 +97,6 @@ def test_the_history_of_a_long_solve_is_whole(rng):
     last = solution.history[np.arange(2), solution.iterations]
     np.testing.assert_allclose(last, solution.residual, rtol=0, atol=1e-12)
     assert (solution.history[1, solution.iterations[1] :] == last[1]).all()
-
-
-def test_tracking_out_of_reach_settles_too():
-    arm, _ = scenes.lab_arm()
-    motion = track(arm, [[3.0, 0.0, 1.0], [3.0, 0.1, 1.0]], "levenberg_marquardt")
-    assert (motion.outcome == Outcome.UNREACHABLE).all()
-    assert (motion.excess <= 1e-4).all()
 
 
 def test_two_positions_out_of_reach_have_the_greater_bound():

@@ -193,19 +193,3 @@ def test_at_rest_only_the_rest_itself_is_without_error():
     system, state = scenes.hanging_rope(particles=4, gravity=0.0)
     assert judge_step(system, state, h, state.positions).error == 0
     assert judge_step(system, state, h, state.positions + 1e-6).error == math.inf
-
-
-def test_a_system_of_pins_can_be_judged():
-    system = MassSpring([1.0, 1.0], [[0, 1]], 1.0, 1.0, pinned=[0, 1])
-    state = State(np.eye(3)[:2], np.zeros((2, 3)))
-    found = judge_step(system, state, h, state.positions)
-    assert (found.error, found.pin_displacement) == (0, 0)
-    assert found.certificate.covered
-
-
-def test_external_forces_are_part_of_the_step(soft):
-    system, state = soft
-    push = np.full_like(state.positions, 0.3)
-    x = ImplicitEuler(system, h=h).step(state, push).state.positions
-    assert judge_step(system, state, h, x, external_forces=push).error < 1e-9
-    assert judge_step(system, state, h, x).error > 1e-3

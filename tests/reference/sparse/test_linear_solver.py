@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from plumbob.reference import scenes
-from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse.linear_solver import LIBRARIES, NotPositiveDefiniteError, factorize
 
 
@@ -27,24 +25,6 @@ def test_the_solution_solves(library, matrix, rng, sides):
     solved = factorize(matrix, library).solve(matrix @ x)
     # The condition number is below 100: two digits of sixteen, and a few roundings more.
     np.testing.assert_allclose(solved, x, rtol=0, atol=1e-13)
-
-
-def test_the_right_hand_side_stays_and_the_solution_is_contiguous(library, matrix, rng):
-    b = rng.standard_normal((30, 3))
-    kept = b.copy()
-    solved = factorize(matrix, library).solve(b)
-    np.testing.assert_array_equal(b, kept)
-    assert solved.flags.c_contiguous
-    factor = factorize(matrix, library)
-    np.testing.assert_array_equal(factor.solve(np.asfortranarray(b)), solved)
-
-
-def test_a_cloths_matrix_is_solved_to_rounding(library, rng):
-    matrix = global_matrix(scenes.lab_cloth(size=20, stiffness=1e4)[0], 1 / 60)
-    b = rng.standard_normal((400, 3))
-    left = matrix @ factorize(matrix, library).solve(b) - b
-    # Backward stability: the residual is a few roundings of |A| |x|, and |x| is below |b| here.
-    assert np.abs(left).max() < 1e-14 * abs(matrix).max() * np.linalg.norm(b)
 
 
 @pytest.mark.parametrize(
