@@ -27,9 +27,9 @@ def interruptible():
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.fixture(params=compiled.BACKENDS)
+@pytest.fixture
 def backend(request):
-    """Run the test once by numba and once in the interpreter; yields the backend's name."""
+    """Run the test by numba, and in the interpreter too; yields the backend's name."""
     with compiled.set_backend(request.param):
         yield request.param
 
@@ -55,12 +55,28 @@ def quick_names(names, every, without=()):
     return [name for name in names if not any(text in name for text in without)][::every]
 
 
+def backends_of(metafunc, is_quick):
+    """Return the backends of a test: the interpreter is left to the slow tests but for a mark."""
+    fast, plain = compiled.BACKENDS
+    if metafunc.definition.get_closest_marker("both_backends"):
+        return [fast, plain]
+    return [fast] if is_quick else [fast, pytest.param(plain, marks=pytest.mark.slow)]
+
+
+def has_parameter(metafunc, name):
+    """Return whether a test names the values of an argument itself."""
+    return any(name in mark.args[0] for mark in metafunc.definition.iter_markers("parametrize"))
+
+
 def pytest_generate_tests(metafunc):
-    """Make the cases of a sweep: all of them for the slow tests, else only the quick ones."""
+    """Make the cases of backends and sweeps: the default run makes only the quick ones."""
+    is_quick = metafunc.config.option.markexpr == "not slow"
+    if "backend" in metafunc.fixturenames and not has_parameter(metafunc, "backend"):
+        metafunc.parametrize("backend", backends_of(metafunc, is_quick), indirect=True)
     for mark in metafunc.definition.iter_markers("sweep"):
         argument, names = mark.args[0], list(mark.args[1]())
         quick = quick_names(names, **mark.kwargs)
-        if metafunc.config.option.markexpr == "not slow":
+        if is_quick:
             names = quick
         slow = dict.fromkeys(set(names) - set(quick), pytest.mark.slow)
         metafunc.parametrize(argument, [pytest.param(n, marks=slow.get(n, ())) for n in names])
@@ -92,18 +108,9 @@ def sampled(cases, *texts, without=(), every=1):
     return chosen[::every]
 
 
-def is_plain(item):
-    """Whether a test runs in the interpreter what another file of its kernels runs there too."""
-    case = getattr(item, "callspec", None)
-    is_python = case is not None and case.params.get("backend") == "python"
-    return is_python and not item.get_closest_marker("both_backends")
-
-
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config, items):
     """Mark as slow what the marks of tests leave to the heavy sweep."""
-    for item in filter(is_plain, items):
-        item.add_marker(pytest.mark.slow)
     for mark, cases in cases_of(items):
         for item in set(cases) - set(sampled(cases, *mark.args, **mark.kwargs)):
             item.add_marker(pytest.mark.slow)

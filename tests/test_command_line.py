@@ -11,7 +11,6 @@ import command_names
 import numpy as np
 import pytest
 
-from plumbob.bench.figures import sketch
 from plumbob.bench.harness.record import Record, RecordFile
 from plumbob.cli import bench, terminal
 from plumbob.cli import main as cli
@@ -183,6 +182,8 @@ def test_a_figure_that_cannot_be_drawn_costs_itself_and_a_sentence(capsys, monke
     def fail(*_):
         raise ValueError("arange: cannot compute length")
 
+    from plumbob.bench.figures import sketch
+
     monkeypatch.setattr(sketch, "_draw", fail)
     monkeypatch.setattr(sketch, "_cache", type(sketch._cache)())
     RecordFile("out").append([a_record()])
@@ -228,6 +229,7 @@ def test_a_folder_without_a_name_is_misuse_and_nothing_is_written(
 READERS = {"help": ["--help"], "claims": ["check", "--list"], "complaint": ["chek"]}
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("arguments", READERS.values(), ids=READERS)
 @pytest.mark.parametrize("buffered", ["", "1"])
 def test_a_reader_that_leaves_ends_it_without_a_word(arguments, buffered):

@@ -1,17 +1,25 @@
 """The gallery of the documentation: faulty solvers beside right ones."""
 
-import draw_gallery
 import numpy as np
 import pytest
 from PIL import Image
 
-from plumbob.bench.show import scenes
+NAMES = ["curves.svg", "cloths.svg", "missing_parent.gif", "explicit_euler.gif"]
 
 
-@pytest.mark.sample(without=["curves", "cloths"])
-@pytest.mark.parametrize("name", draw_gallery.PICTURES)
-def test_a_famous_fault_shows_beside_the_right_solver(name, monkeypatch):
-    monkeypatch.setattr(scenes, "FRAMES", 20)
+@pytest.fixture
+def draw_gallery():
+    """Return the program, whose imports take long."""
+    import draw_gallery
+
+    assert list(draw_gallery.PICTURES) == NAMES
+    return draw_gallery
+
+
+@pytest.mark.sample("explicit_euler")
+@pytest.mark.parametrize("name", NAMES)
+def test_a_famous_fault_shows_beside_the_right_solver(draw_gallery, name, monkeypatch):
+    monkeypatch.setattr("plumbob.bench.show.scenes.FRAMES", 20)
     solver, faults = draw_gallery.PICTURES[name]
     *wrong, right = draw_gallery.beside_truth(solver, faults).motions
     assert [motion.label for motion in wrong] == [fault.title for fault in faults]
@@ -20,8 +28,8 @@ def test_a_famous_fault_shows_beside_the_right_solver(name, monkeypatch):
 
 
 @pytest.mark.slow
-def test_the_gallery_has_pictures_and_films(tmp_path, monkeypatch):
-    monkeypatch.setattr(scenes, "FRAMES", 12)
+def test_the_gallery_has_pictures_and_films(draw_gallery, tmp_path, monkeypatch):
+    monkeypatch.setattr("plumbob.bench.show.scenes.FRAMES", 12)
     names = ["cloths.svg", "explicit_euler.gif"]
     pictures = {name: draw_gallery.PICTURES[name] for name in names}
     monkeypatch.setattr(draw_gallery, "PICTURES", pictures)

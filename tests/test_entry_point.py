@@ -32,6 +32,7 @@ def run(arguments, folder, **options):
     return subprocess.run(command, cwd=folder, env=environment, text=True, check=False, **options)
 
 
+@pytest.mark.sample(without=["script-numpy", "script-typer"])
 @pytest.mark.parametrize(
     ("door", "module", "source", "arguments"),
     [
@@ -63,7 +64,7 @@ def test_the_library_leaves_ctrl_c_as_it_is(tmp_path):
 CLOSED = {"stdin": [0], "stdout": [1], "stderr": [2], "both": [1, 2], "all": [0, 1, 2]}
 
 
-@pytest.mark.sample(every=2)
+@pytest.mark.sample("arguments0-2-stdout", "arguments0-2-all", "arguments1-0-stderr")
 @pytest.mark.parametrize("closed", CLOSED.values(), ids=CLOSED)
 @pytest.mark.parametrize(("arguments", "code"), [(["chek"], 2), (["check", "--list"], 0)])
 def test_a_closed_stream_costs_what_is_printed_there(tmp_path, closed, arguments, code):
@@ -85,8 +86,8 @@ def test_a_file_does_not_take_the_place_of_a_closed_stream(tmp_path):
     assert int((tmp_path / "file").read_text()) > 2
 
 
-@pytest.mark.parametrize(("arguments", "code"), [(["--version"], 2), (["chek"], 2)])
-def test_a_full_disk_behind_both_streams_leaves_the_exit_code(tmp_path, arguments, code):
+@pytest.mark.parametrize("arguments", [["--version"], ["chek"]])
+def test_a_full_disk_behind_both_streams_leaves_the_exit_code(tmp_path, arguments):
     with Path("/dev/full").open("w") as full:
         done = run([*DOORS["script"], *arguments], tmp_path, stdout=full, stderr=full)
-    assert done.returncode == code
+    assert done.returncode == 2

@@ -1,4 +1,5 @@
 import csv
+import itertools
 import json
 import re
 import subprocess
@@ -61,6 +62,7 @@ def test_the_blocks_of_a_page_are_one_program_that_prints_what_it_says(
         assert capsys.readouterr().out == printed
 
 
+@pytest.mark.slow
 def test_the_solver_of_the_page_on_pictures_is_drawn(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     page = README.parent / "docs" / "show.md"
@@ -70,18 +72,11 @@ def test_the_solver_of_the_page_on_pictures_is_drawn(capsys, monkeypatch, tmp_pa
     assert capsys.readouterr().out == f"{command[-1]}\n"
 
 
-def verified(page, folder, change=None):
-    """The report of verify on the first Python block of a page, with a line changed or not."""
-    code = snippets("python", page)[0]
-    if change:
-        assert change in code
-        code = code.replace(change, "pass")
-    file = folder / "my_ik.py"
-    file.write_text(code, encoding="utf-8")
-    json_path = folder / "verdict.json"
-    command = [sys.executable, "-m", "plumbob", "verify", "my_ik.py", "--json", str(json_path)]
-    run = subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
-    return run, json.loads(json_path.read_text(encoding="utf-8"))
+def verified(*names):
+    """Return the exit code and the record of `plumbob verify` on a file of the working folder."""
+    command = [sys.executable, "-m", "plumbob", "verify", *names, "--json", "verdict.json"]
+    run = subprocess.run(command, capture_output=True, check=False, timeout=300)
+    return run.returncode, json.loads(Path("verdict.json").read_text(encoding="utf-8"))
 
 
 def flat(text):
@@ -90,23 +85,41 @@ def flat(text):
 
 
 @pytest.mark.slow
-def test_the_solver_of_the_readme_is_right_and_is_said_to_be(tmp_path):
-    run, report = verified(README, tmp_path)
-    assert run.returncode == 0
-    for page in (README, CHINESE):
-        shown = flat(page.read_text(encoding="utf-8"))
-        for task in report["tasks"]:
-            assert flat(f"{task['task']} {task['method']}") in shown
-            assert f"{task['passed']}/{len(task['cases'])}" in shown
+def test_the_solver_of_the_readme_is_right_and_its_mistake_is_named(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    code = snippets("python")[0]
+    line = "turned = multiply(r[parents[joint]] * [1, -1, -1, -1], turned)"
+    shown = {page: flat(page.read_text(encoding="utf-8")) for page in (README, CHINESE)}
+    Path("my_ik.py").write_text(code, encoding="utf-8")
+    exit_code, report = verified("my_ik.py")
+    assert exit_code == 0
+    for task, text in itertools.product(report["tasks"], shown.values()):
+        assert flat(f"{task['task']} {task['method']}") in text
+        assert f"{task['passed']}/{len(task['cases'])}" in text
+    assert line in code
+    Path("my_ik.py").write_text(code.replace(line, "pass"), encoding="utf-8")
+    exit_code, report = verified("my_ik.py")
+    assert exit_code == 1
+    (explanation,) = report["tasks"][1]["explanations"]
+    words = explanation["text"].partition("] ")[2]
+    assert words in catalogue.templates()
+    for page, language in ((README, "en"), (CHINESE, "zh")):
+        assert flat(f"[{explanation['codes'][0]}] {translator(language)(words)}") in shown[page]
+
+
+def test_the_mistake_that_the_readme_shows_is_explained(capsys):
+    (code,) = re.findall(r"\[(PB-[A-Z]+-\d+)\]", README.read_text(encoding="utf-8"))
+    assert cli.run_command(["explain", code]) == 0
+    explanation = flat(capsys.readouterr().out)
+    assert "YourCCDstoresthenewglobalrotationdRasthelocalone." in explanation
+    assert f"[{code}]" in CHINESE.read_text(encoding="utf-8")
 
 
 def test_the_first_program_for_students_is_right(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert blocks(README.parent / "docs" / "student.md") == []
-    command = [sys.executable, "-m", "plumbob", "verify", "my_points.py", "--json", "v.json"]
-    run = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert run.returncode == 0, run.stdout
-    assert json.loads(Path("v.json").read_text())["verdict"] == "right"
+    exit_code, report = verified("my_points.py")
+    assert (exit_code, report["verdict"]) == (0, "right")
 
 
 def test_the_summary_for_lecturers_has_a_row_of_each_submission(tmp_path, monkeypatch):
@@ -135,18 +148,6 @@ def test_both_pages_show_the_same_program():
     assert codes[0] == codes[1]
 
 
-def test_the_mistake_that_the_readme_shows_is_named(tmp_path):
-    line = "turned = multiply(r[parents[joint]] * [1, -1, -1, -1], turned)"
-    run, report = verified(README, tmp_path, change=line)
-    assert run.returncode == 1
-    (explanation,) = report["tasks"][1]["explanations"]
-    (code,), text = explanation["codes"], explanation["text"].partition("] ")[2]
-    for page, language in [(README, "en"), (CHINESE, "zh")]:
-        words = f"[{code}] {translator(language)(text)}"
-        assert flat(words) in flat(page.read_text(encoding="utf-8"))
-    assert text in catalogue.templates()
-
-
 @pytest.mark.parametrize("page", [README, CHINESE], ids=["en", "zh"])
 def test_the_python_interface_runs_as_printed(page, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
@@ -161,22 +162,13 @@ def test_the_readme_is_one_screen_to_read():
     assert len(prose.split()) <= 600
 
 
-LINKS = [
-    (page, link)
-    for page in (README, CHINESE, *PAGES)
-    for link in re.findall(r"\]\(([^)#:]+)\)", page.read_text(encoding="utf-8"))
-]
-
-
-@pytest.mark.parametrize(("page", "link"), LINKS)
-def test_every_file_that_is_linked_exists(page, link):
-    assert (page.parent / link).exists()
-
-
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_path_that_a_page_names_exists(page):
-    named = re.findall(r"`(?!report|build)([a-z_]+/[a-z_/.]*)`", page.read_text(encoding="utf-8"))
-    assert [path for path in named if not (README.parent / path).exists()] == []
+@pytest.mark.parametrize("page", [README, CHINESE, *PAGES], ids=lambda page: page.name)
+def test_every_file_that_a_page_names_exists(page):
+    text = page.read_text(encoding="utf-8")
+    linked = [page.parent / link for link in re.findall(r"\]\(([^)#:]+)\)", text)]
+    folders = re.findall(r"`(?!report|build)([a-z_]+/[a-z_/.]*)`", text) if page in PAGES else []
+    named = linked + [README.parent / path for path in folders]
+    assert [path for path in named if not path.exists()] == []
 
 
 def test_no_page_installs_plumbob_from_an_index():
@@ -197,15 +189,14 @@ def test_every_make_target_that_is_named_exists():
         assert {"report", "test"} <= set(re.findall(r"make ([a-z-]+)", page.read_text("utf-8")))
 
 
-def options():
-    """The options of `plumbob verify` that its help names."""
-    command = [sys.executable, "-m", "plumbob", "verify", "--help"]
-    run = subprocess.run(command, capture_output=True, text=True, check=True, cwd=README.parent)
-    return set(re.findall(r"--[a-z-]+", run.stdout))
+def options(capsys):
+    """Return the options of `plumbob verify` that its help names."""
+    assert cli.run_command(["verify", "--help"]) == 0
+    return set(re.findall(r"--[a-z-]+", capsys.readouterr().out))
 
 
-def test_every_option_of_verify_that_a_page_shows_exists():
-    known = options()
+def test_every_option_of_verify_that_a_page_shows_exists(capsys):
+    known = options(capsys)
     for page in (README, CHINESE, README.parent / "docs" / "verify.md"):
         lines = re.findall(r"plumbob verify [^\n`]*", page.read_text(encoding="utf-8"))
         shown = {option for line in lines for option in re.findall(r" (--[a-z-]+)", line)}
@@ -234,7 +225,7 @@ def keys(value):
         yield from keys(inner)
 
 
-def test_the_page_of_verify_describes_every_key_and_option():
+def test_the_page_of_verify_describes_every_key_and_option(capsys):
     text = (README.parent / "docs" / "verify.md").read_text(encoding="utf-8")
     finding = Finding("a law", Verdict.WRONG, 1.0, 0.0, "m", sentence("It is off."))
     case = Case("one", "energy", {}, "x", sentence("It is all."))
@@ -243,4 +234,4 @@ def test_the_page_of_verify_describes_every_key_and_option():
     report = Report(Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], why)], 0)
     for name in keys(json_file.record(report, str)):
         assert f"`{name}`" in text or f"`{name}[]`" in text, name
-    assert {option for option in options() if option not in text} == {"--help", "--output"}
+    assert {option for option in options(capsys) if option not in text} == {"--help", "--output"}

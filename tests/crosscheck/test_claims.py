@@ -10,9 +10,6 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.experiments.check import verdicts
-from plumbob.bench.harness.record import Record
-from plumbob.bench.tables.results import Results
 from plumbob.crosscheck.claims import (
     CLAIMS,
     MASS_SPRING_CLAIMS,
@@ -213,8 +210,13 @@ for name, claim in CLAIMS.items():
 """
 
 
+@pytest.mark.slow
 def test_what_is_counted_as_resting_on_an_engine_cannot_be_checked_without_it():
     """Six claims were once said to hold against an engine, and rest on closed forms."""
+    from plumbob.bench.experiments.check import verdicts
+    from plumbob.bench.harness.record import Record
+    from plumbob.bench.tables.results import Results
+
     command = [sys.executable, "-c", WITHOUT_ENGINES]
     printed = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
     claims = list(CLAIMS.values())
