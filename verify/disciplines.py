@@ -1,7 +1,7 @@
 """The tasks, each with its cases, its laws, and the search for the cause of wrong answers."""
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 from .case import Case
 from .cause_search import JudgedAnswers
@@ -9,16 +9,24 @@ from .contestant import Exchange
 from .greeting import Greeting
 from .judgement import Diagnosis, TaskReport
 from .kinematics import (
+    forward_diagnosis,
     forward_kinematics,
+    inverse_diagnosis,
     inverse_kinematics,
     resample,
+    resample_diagnosis,
+    robot_inverse_diagnosis,
     robot_inverse_kinematics,
     robot_jacobian,
+    robot_jacobian_diagnosis,
     robot_track,
+    robot_track_diagnosis,
     robot_velocity,
+    robot_velocity_diagnosis,
     track,
+    track_diagnosis,
 )
-from .mass_spring import energy, energy_diagnosis, force_diagnosis, forces, stepping
+from .mass_spring import energy, energy_diagnosis, force_diagnosis, forces, step_diagnosis
 from .mass_spring.stepping import Stepping
 
 
@@ -34,20 +42,21 @@ class Discipline(NamedTuple):
     diagnose: Callable[[JudgedAnswers], Diagnosis]
 
 
-STEPS, MOTIONS = Stepping("mass_spring_step"), Stepping("mass_spring_motion")
-DISCIPLINES: Mapping[str, Discipline] = (
-    {
-        task.TASK: Discipline(task.cases, task.judge, task.diagnose)
-        for task in (forward_kinematics, inverse_kinematics, track, resample)
-    }
-    | {
-        forces.TASK: Discipline(forces.cases, forces.judge, force_diagnosis.diagnose),
-        energy.TASK: Discipline(energy.cases, energy.judge, energy_diagnosis.diagnose),
-        STEPS.task: Discipline(STEPS.cases, STEPS.judge, stepping.diagnose),
-        MOTIONS.task: Discipline(MOTIONS.cases, MOTIONS.judge, stepping.diagnose),
-    }
-    | {
-        task.TASK: Discipline(task.cases, task.judge, task.diagnose)
-        for task in (robot_jacobian, robot_velocity, robot_inverse_kinematics, robot_track)
-    }
+# The laws of each task, and what explains wrong answers.
+_PAIRS: Sequence[tuple[Any, Any]] = (
+    (forward_kinematics, forward_diagnosis),
+    (inverse_kinematics, inverse_diagnosis),
+    (track, track_diagnosis),
+    (resample, resample_diagnosis),
+    (forces, force_diagnosis),
+    (energy, energy_diagnosis),
+    (Stepping("mass_spring_step"), step_diagnosis),
+    (Stepping("mass_spring_motion"), step_diagnosis),
+    (robot_jacobian, robot_jacobian_diagnosis),
+    (robot_velocity, robot_velocity_diagnosis),
+    (robot_inverse_kinematics, robot_inverse_diagnosis),
+    (robot_track, robot_track_diagnosis),
 )
+DISCIPLINES: dict[str, Discipline] = {
+    laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose) for laws, causes in _PAIRS
+}

@@ -6,13 +6,8 @@ import pytest
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics.robot_jacobian import (
-    CONVENTIONS,
-    FAULTS,
-    TASK,
-    cases,
-    right_jacobian,
-)
+from plumbob.verify.kinematics.robot_jacobian import CONVENTIONS, TASK, cases, right_jacobian
+from plumbob.verify.kinematics.robot_jacobian_diagnosis import FAULTS
 from plumbob.verify.kinematics.robot_models import tool_pose
 from plumbob.verify.kinematics.trajectories import twists_between
 from plumbob.verify.verify import verify

@@ -18,7 +18,8 @@ from plumbob.verify.kinematics import motion_faults, robot_motions
 from plumbob.verify.kinematics.robot_faults import FAULTS as POSE_FAULTS
 from plumbob.verify.kinematics.robot_models import mechanism, tool_at
 from plumbob.verify.kinematics.robot_motions import TASK, followed
-from plumbob.verify.kinematics.robot_track import _too_fast, judge
+from plumbob.verify.kinematics.robot_track import judge
+from plumbob.verify.kinematics.robot_track_diagnosis import _too_fast
 from plumbob.verify.kinematics.trajectories import Trajectory, twists_between
 from plumbob.verify.verify import verify
 

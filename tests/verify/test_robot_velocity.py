@@ -7,7 +7,7 @@ from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import robot_jacobian
+from plumbob.verify.kinematics import robot_jacobian, robot_jacobian_diagnosis
 from plumbob.verify.kinematics.robot_models import tool_pose
 from plumbob.verify.kinematics.robot_velocity import (
     SINGULAR,
@@ -117,7 +117,7 @@ def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
 
 @pytest.mark.parametrize("key", ["axes not rotated"])
 def test_a_wrong_jacobian_is_named(key):
-    fault = robot_jacobian.FAULTS[key]
+    fault = robot_jacobian_diagnosis.FAULTS[key]
 
     def predict(**inputs):
         J = next(iter(fault.jacobians(inputs, inputs["q"])))
@@ -129,7 +129,7 @@ def test_a_wrong_jacobian_is_named(key):
 
 
 def test_of_equal_explanations_that_of_the_jacobian_alone_is_named():
-    fault = robot_jacobian.FAULTS["arms to the last joint"]
+    fault = robot_jacobian_diagnosis.FAULTS["arms to the last joint"]
     exchanges = []
     for case in CASES[::4]:
         J = next(iter(fault.jacobians(case.inputs, case.inputs["q"])))

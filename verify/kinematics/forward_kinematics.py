@@ -1,7 +1,6 @@
 """Forward kinematics: where all joints are, and how they are rotated."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,14 +10,13 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
-from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Finding, TaskReport
 from ..laws import digits, finding, judge_case, not_finite, of_joints
 from . import rounding, skeletons
 from .pose_laws import unit_quaternions
-from .report import diagnosis_of, report, with_hints
+from .report import report
 from .skeletons import CaseFamily, drawn
 
 TASK = "forward_kinematics"
@@ -46,40 +44,6 @@ def judge(
     """Compare positions and rotations separately with the reference."""
     judgements = [_judge(exchange, greeting) for exchange in exchanges]
     return report(TASK, method, judgements)
-
-
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
-    """Return the faults that explain the poses, if some are wrong."""
-    pairs = zip(judged.exchanges, judged.report.judgements, strict=True)
-    wrong = [exchange for exchange, j in pairs if j.verdict > Verdict.RIGHT_EXCEPT]
-    diagnosis = _diagnosis(judged.exchanges, wrong, judged.greeting)
-    return with_hints(judged.report.judgements, diagnosis)
-
-
-def _diagnosis(
-    exchanges: Sequence[Exchange], wrong: Sequence[Exchange], greeting: Greeting
-) -> Diagnosis:
-    """Return the faults that reproduce the answers, or else their positions alone."""
-    bound = partial(_prediction_bound, greeting)
-    diagnosis = diagnosis_of("forward", exchanges, wrong, bound)
-    if wrong and not diagnosis.explained:  # matrices that are no rotations become any quaternion
-        alone = {id(exchange): _positions_alone(exchange) for exchange in exchanges}
-        of_wrong = [alone[id(exchange)] for exchange in wrong]
-        diagnosis = diagnosis_of("forward", list(alone.values()), of_wrong, bound)
-    return diagnosis
-
-
-def _positions_alone(exchange: Exchange) -> Exchange:
-    outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
-    if "positions" not in outputs:
-        return exchange
-    return replace(exchange, answer=Answer({"positions": outputs["positions"]}, 0.0))
-
-
-def _prediction_bound(greeting: Greeting, case: Case) -> float:
-    """Return the relative difference from a variant's answer that rounding explains."""
-    joints = len(case.inputs["parents"])
-    return max(1e-9, 4.0 * rounding.positions(greeting.epsilon, joints, 1.0))
 
 
 def _judge(exchange: Exchange, greeting: Greeting) -> CaseJudgement:

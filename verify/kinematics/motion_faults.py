@@ -1,6 +1,6 @@
 """Faults of robots that reach and follow targets: the frames that they explain."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, lru_cache, partial
 from itertools import islice
@@ -13,8 +13,7 @@ from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.rotation import roll_pitch_yaw
 from plumbob.reference.skeleton import Pose
 
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
-from ..laws import finding
+from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
 from .faults import TABLE, sentences_of
 from .formulas import branches, evaluate
 from .robot_faults import FAULTS as POSE_FAULTS
@@ -22,7 +21,16 @@ from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
 from .robot_models import feature_of, tool_pose
 from .robot_targets import HALF_TURNS, LIMIT_STEP, STEP, TOLERANCE
 from .robot_textbook import ancestors, rotation_error, sine_error
-from .trajectories import AT_LIMIT, LENIENT, Trajectory, twists_between
+from .trajectories import (
+    AT_LIMIT,
+    EXACT,
+    LENIENT,
+    SAME_SPEED,
+    Trajectory,
+    is_at_minimum,
+    is_falling_at,
+    twists_between,
+)
 
 # Steps agree if they differ by less than this share, with one of these squared dampings [m^2];
 # finer ones are tried where they differ by less than the second; without joints, by the third.
@@ -35,18 +43,12 @@ EQUAL_STEP, NEARER, TIE = 3e-3, 1.5, 1e-6
 SINGULAR = 0.05
 # Fewer joints off their limits fit any step, and fewer joints reach no pose in general.
 MIN_FREE, POSE_FREEDOMS = 5, 6
-# An error is least where its gradient is this small, relative to error and Jacobian.
-STATIONARY = 0.01
-# The squares of the weights that solvers give rotations [m^2].
-SQUARED_WEIGHTS = (1e-3, 1e2)
 # Frames that a fault has to explain before it is named, and the least share of those it concerns.
 MIN_FRAMES, MIN_SHARE = 3, 0.5
 # The least share of the missed frames that rest where frames are skipped.
 MOSTLY = 0.9
 # A rotation by about 2 pi: by how much it may differ [rad].
 WHOLE_TURN = 0.7
-# Errors that fall to less than this share have been reduced.
-REDUCED = 0.9
 # Steps of some length agree to this share; factors of steps that are too short, dampings that are
 # too large [m^2]; a step goes nowhere if the cosine of its angle with the right one is smaller.
 SAME_SCALE, SHORT, OVERDAMPED = 0.02, (1e-3, 0.3), np.geomspace(0.3, 1e3, 60)[:, None]
@@ -56,8 +58,6 @@ MAX_JACOBIANS = 3
 UNIT_WEIGHTS = np.ones(6)
 # Coordinates are well beyond a limit by more than this [rad, m].
 WELL_BEYOND = 0.01
-# Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
-EXACT, SAME_SPEED = 1e-9, 1e-3
 SENTENCES = sentences_of("robot_track")
 SENTENCES |= {key: fault.sentence for key, fault in (POSE_FAULTS | JACOBIAN_FAULTS).items()}
 
@@ -217,12 +217,6 @@ def _sine_if_near(R: FloatArray, goals: FloatArray) -> FloatArray:
     return np.where(is_near[:, None], sine_error(R, goals), np.pi)
 
 
-def is_falling_at(motion: Trajectory) -> bool:
-    """Return whether the error of a pose has fallen from the start and can fall further."""
-    before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
-    return bool(((after < REDUCED * before) & ~_is_at_minimum(motion)).any())
-
-
 def _in_branch(branch: int, motion: Trajectory, laws: set[str]) -> Evidence:
     """Return the frames off targets, or in a branch of the way from a matrix to a quaternion."""
     poses = tool_pose(motion.inputs, motion.q).rotations, motion.targets().rotations
@@ -230,27 +224,6 @@ def _in_branch(branch: int, motion: Trajectory, laws: set[str]) -> Evidence:
     is_missed = _ends_off_target(motion)
     concerned = motion.case.facts["reachable"] & (motion.inputs["max_iterations"] > 1)
     return Evidence((is_missed | is_in) & concerned, is_missed & is_in)
-
-
-def _is_at_minimum(motion: Trajectory) -> BoolArray:
-    """Return whether no joint off its limits would reduce the error, (frame).
-
-    Solvers weigh rotations as they like: some weight may make it the least.
-    """
-    e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
-    J = J * ~motion.at_limits[:, None, :]
-    linear, angular = (
-        np.einsum("fij,fi->fj", J[:, part], e[:, part]) for part in (slice(3), slice(3, 6))
-    )
-    lengths = np.maximum((angular * angular).sum(axis=-1), 1e-300)
-    balance = np.clip(-(linear * angular).sum(axis=-1) / lengths, *SQUARED_WEIGHTS)
-    is_least = np.zeros(len(e), dtype=bool)
-    for square in (np.ones(len(e)), balance):
-        rows = np.repeat(np.stack([np.ones(len(e)), np.sqrt(square)], axis=-1), 3, axis=-1)
-        gradient = np.linalg.norm(linear + square[:, None] * angular, axis=-1)
-        size = np.linalg.norm(J * rows[..., None], axis=(1, 2))
-        is_least |= gradient <= STATIONARY * size * np.linalg.norm(e * rows, axis=-1)
-    return is_least
 
 
 def _limits_ignored(motion: Trajectory, laws: set[str]) -> Evidence:
@@ -458,7 +431,7 @@ def _is_stuck(key: str, motion: Trajectory, laws: set[str]) -> Evidence:
     scale = np.linalg.norm(right, axis=-1) * np.linalg.norm(wrong, axis=-1)
     cosine = (right * wrong).sum(axis=-1) / np.maximum(scale, 1e-300)
     is_left = (np.abs(motion.changes).max(axis=-1) <= AT_LIMIT) & (cosine < 0.0)
-    concerned = _ends_off_target(motion) & motion.is_pose & ~_is_at_minimum(motion) & ~is_left
+    concerned = _ends_off_target(motion) & motion.is_pose & ~is_at_minimum(motion) & ~is_left
     return Evidence(concerned, np.abs(cosine) <= NOWHERE)
 
 
@@ -600,28 +573,6 @@ def _misplaced(motion: Trajectory, laws: set[str]) -> Evidence:
     gaps = _gaps(changes, steps, (0.0, np.inf)).min(axis=-1)
     is_step = gaps <= MISPLACED * np.linalg.norm(changes, axis=-1)
     return Evidence(concerned, is_as_meant.all(axis=-1) & is_step)
-
-
-def limit_laws(motion: Trajectory, motions: Iterable[Trajectory]) -> Iterator[Finding]:
-    """Yield whether a single iteration from a joint's limit moves the joints that it should.
-
-    The joint has to stay in all motions: in one it may be clamped by chance.
-    """
-    facts = motion.case.facts
-    if motion.case.family != LIMIT_STEP or _is_still(motion).all():
-        return
-    stays = [_is_still(other)[other.case.facts["held"]] for other in motions
-             if other.case.family == LIMIT_STEP and other.case.facts["is_leaving"]]  # fmt: skip
-    yield finding("steps at limits", facts["is_leaving"] and all(stays), index=facts["held"])
-    is_other = _is_still(motion) & (ancestors(motion.inputs) > 0.0)
-    other_joints = np.setdiff1d(np.flatnonzero(is_other), facts["held"])
-    yield finding("steps at limits, others", len(other_joints), index=facts["held"],
-                  others=", ".join(map(str, other_joints)))  # fmt: skip
-
-
-def _is_still(motion: Trajectory) -> BoolArray:
-    """Return whether joints stay in the first frame, (joint)."""
-    return np.asarray(np.abs(motion.changes[0]) <= EXACT)
 
 
 def _both(R: FloatArray, twists: FloatArray) -> FloatArray:

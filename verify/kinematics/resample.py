@@ -1,6 +1,6 @@
 """Resampling a polyline: laws, since every program has its own rule, and a few known faults."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -11,17 +11,14 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
-from ..explain import Variant, explain
 from ..greeting import Greeting
-from ..judgement import Diagnosis, Finding, TaskReport, Verdict
+from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
 from . import rounding
-from .faults import AS_THE_TEXTBOOK, sentences_of
 from .polylines import Polyline
-from .report import report, with_hints
-from .resample_faults import FAULTS, even_points
+from .report import report
+from .resampling import even_points
 from .skeletons import generator
 
 TASK = "resample"
@@ -101,18 +98,6 @@ def judge(
         for exchange in exchanges
     ]  # fmt: skip
     return report(TASK, method, judgements, _behaviour_at_strokes(exchanges, greeting))
-
-
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
-    """Return the faults that explain the points, if some are wrong."""
-    judgements, behaviour = judged.report.judgements, judged.report.diagnosis.behaviour
-    pairs = zip(judged.exchanges, judgements, strict=True)
-    wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
-    diagnosis = Diagnosis(behaviour=behaviour)
-    if any(judgement.verdict and isinstance(judgement.answer, Answer) for judgement in judgements):
-        ordered = [exchange for exchange, _ in wrong_first]
-        diagnosis = _diagnosis(ordered, judged.greeting, behaviour)
-    return with_hints(judgements, diagnosis)
 
 
 def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> Sentence | None:
@@ -237,25 +222,3 @@ def _closing(points: FloatArray, arc: FloatArray, line: Polyline, bound: float) 
     widest = float(np.diff(arc).max()) * (1.0 + UNEVEN)
     gap_text, limit = distinct_texts(gap, widest, 3)
     return finding("closing side", gap, widest + 2.0 * bound, gap=gap_text, widest=limit)
-
-
-def _diagnosis(
-    wrong_first: Sequence[Exchange], greeting: Greeting, behaviour: Sentence | None
-) -> Diagnosis:
-    """Return the faults that reproduce the answers."""
-    sentences = {"": AS_THE_TEXTBOOK, **sentences_of(TASK)}
-
-    def variant(key: str, points: Callable[[Case], FloatArray]) -> Variant:
-        return Variant((key,) if key else (), lambda case: {"points": points(case)})
-
-    def tolerance(case: Case) -> float:
-        return max(1e-9, 64.0 * greeting.epsilon * len(case.inputs["curve"]))
-
-    models = {"": (even_points,), **FAULTS}
-    variants = [variant(key, points) for key, choices in models.items() for points in choices]
-    explanations, count = explain(variants, wrong_first, tolerance, lambda keys: sentences[keys[0]])
-    keys = [explanation.faults for explanation in explanations]
-    faulty = tuple(  # of the implementations of a fault the best
-        explanations[i] for i in range(len(keys)) if keys[i] not in (("",), *keys[:i])
-    )
-    return Diagnosis(faulty, behaviour, variant_count=count)

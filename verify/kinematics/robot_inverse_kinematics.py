@@ -1,7 +1,6 @@
 """Robots with limits: whether tools reach their targets, limits are kept and claims are true."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -14,25 +13,19 @@ from plumbob.reference.judging import PoseJudgement
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from . import motion_faults, robot_targets, rounding
-from .motion_faults import is_falling_at
-from .report import report, with_hints
+from . import robot_targets, rounding
+from .report import report
 from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
-from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, FEW, MOST, UNREACHED
-from .trajectories import Trajectory, trajectories
+from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
+from .trajectories import Trajectory, is_falling_at, limit_laws, trajectories
 
 TASK = robot_targets.TASK
 # Coordinates that differ by less are the same answer [rad, m].
 SAME = 1e-9
-# Iterations agree with damped steps to this share, with one of these weights of the rotation and
-# squared dampings; a damping grows if it is so many times as large in the end.
-SAME_ITERATION, GROWTH = 0.1, 50.0
-WEIGHTS, DAMPINGS = np.geomspace(0.05, 10.0, 101), np.geomspace(1e-9, 1e4, 401)[:, None]
 cases = robot_targets.cases
 
 
@@ -57,28 +50,6 @@ def judge(
     return report(TASK, method, judgements, words if _ignores_start(motions.values()) else None)
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
-    """Return the faults that explain the coordinates, likely those of the Jacobian."""
-    judgements = judged.report.judgements
-    motions = trajectories(judged.exchanges, trajectory_of)
-    diagnosis = _diagnosis(judgements, motions, judged.base)
-    if not diagnosis.explained:
-        diagnosis = replace(diagnosis, behaviour=judged.report.diagnosis.behaviour)
-    return with_hints(judgements, diagnosis)
-
-
-def _diagnosis(
-    judgements: Sequence[CaseJudgement],
-    motions: Mapping[str, Trajectory],
-    base: Sequence[str] | None,
-) -> Diagnosis:
-    """Return the faults of motions and of solves of few iterations."""
-    diagnosis = motion_faults.diagnosis_of(judgements, motions, base)
-    if [explanation.faults for explanation in diagnosis.explanations] in ([], [("stopped early",)]):
-        return _with_iterations(diagnosis, motions.values(), judgements)
-    return diagnosis
-
-
 def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:
     """Return whether failure is reported where the start is at the target, and not near it."""
     claims: dict[str, list[bool]] = {}
@@ -99,41 +70,6 @@ def _ignores_start(motions: Iterable[Trajectory]) -> bool:
             answers.setdefault(inputs["target_position"].tobytes(), []).append(motion.q[0])
     groups = [q for q in answers.values() if len(q) > 1]
     return bool(groups) and all(np.ptp(q, axis=0).max() <= SAME for q in groups)
-
-
-def _with_iterations(
-    diagnosis: Diagnosis, motions: Iterable[Trajectory], judgements: Sequence[CaseJudgement]
-) -> Diagnosis:
-    """Return a diagnosis with what solves of one iteration, of two and so on show."""
-    solves = [motion for motion in motions if motion.case.family == FEW]
-    verdict = max(judgement.verdict for judgement in judgements)
-    if len(solves) < MOST or verdict == Verdict.RIGHT:
-        return diagnosis
-    motion = replace(solves[0], q=np.concatenate([solve.q for solve in solves]))  # by iteration
-    gaps, dampings = _fitted(motion, motion.jacobians)
-    frozen, _ = _fitted(motion, np.repeat(motion.jacobians[:1], MOST, axis=0))
-    is_falling = (np.diff(np.linalg.norm(motion.twists(motion.q), axis=-1)) < 0.0).all()
-    is_growing = (np.diff(dampings) >= 0.0).all() and dampings[-1] > GROWTH * dampings[0]
-    if frozen.max() < SAME_ITERATION < gaps[1:].max():
-        key = "Jacobian kept"
-    elif verdict >= Verdict.WRONG and gaps.max() <= SAME_ITERATION and is_falling and is_growing:
-        key = "damping grows"
-    else:
-        return diagnosis
-    return Diagnosis((Explanation((key,), motion_faults.SENTENCES[key], 1.0, 0.0),))
-
-
-def _fitted(motion: Trajectory, J: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return how far iterations are from damped steps, relative to them, and their dampings."""
-    e, lengths = motion.twists(motion.previous), np.linalg.norm(motion.changes, axis=-1)
-    fits = []
-    for weight in WEIGHTS:
-        rows = np.repeat([1.0, weight], 3)
-        steps = motion_faults.damped_steps(J * rows[:, None], e * rows, DAMPINGS)
-        gaps = np.linalg.norm(motion.changes[:, None] - steps, axis=-1) * (lengths > SAME)[:, None]
-        gaps /= np.maximum(lengths, SAME)[:, None]
-        fits.append((gaps.min(axis=-1), DAMPINGS[gaps.argmin(axis=-1), 0]))
-    return min(fits, key=lambda fit: float(fit[0].max()))
 
 
 def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
@@ -158,11 +94,11 @@ def _findings(
     judgement = judgement_of(case.inputs, q)
     limits = _limits(judgement, q, case, greeting)
     stays = any(law.verdict for motion in motions.values()
-                for law in motion_faults.limit_laws(motion, motions.values()))  # fmt: skip
+                for law in limit_laws(motion, motions.values()))  # fmt: skip
     laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero, stays)]
     if case.family == AT_A_LIMIT:
         laws.append(finding("limits in the solve", motions[case.name].is_clamped[0]))
-    return [*laws, *motion_faults.limit_laws(motions[case.name], motions.values())]
+    return [*laws, *limit_laws(motions[case.name], motions.values())]
 
 
 def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greeting) -> Finding:

@@ -11,16 +11,15 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import JudgedAnswers
 from ..contestant import Exchange
 from ..greeting import Greeting
-from ..judgement import Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from . import motion_faults, robot_motions, rounding
-from .report import report, with_hints
+from . import robot_motions, rounding
+from .report import report
 from .robot_models import FARTHEST
 from .robot_targets import TOLERANCE
-from .trajectories import LENIENT, Trajectory, trajectories
+from .trajectories import LENIENT, Trajectory, limit_laws, trajectories
 
 TASK = robot_motions.TASK
 cases = robot_motions.cases
@@ -38,10 +37,6 @@ REMAINDER = 0.3
 AT_REST = 1e-4
 # Joint angles that differ by less after a lap have not drifted [rad].
 NO_DRIFT = 1e-2
-# A limit of speeds that is kept in some way is exceeded by more than this.
-SPEEDING = 1.1
-# The share of the largest speed from which on speeds are alike.
-ALIKE = 1.0 - 1e-6
 # Answers to equal targets whose quaternions have another sign may differ so much [rad].
 SAME = 1e-2
 # The joints of a start beyond its limits are to be within after so many frames.
@@ -60,7 +55,7 @@ def judge(
     method: str,
 ) -> TaskReport:
     """Judge motions by the laws of tracking."""
-    motions = trajectories(exchanges, _trajectory_of)
+    motions = trajectories(exchanges, motion_of)
     judgements = [
         judge_case(
             exchange, partial(_findings, exchange.case.name, motions, greeting),
@@ -72,37 +67,7 @@ def judge(
     return report(TASK, method, judgements)
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
-    """Return the faults that explain the motions, likely those of the Jacobian."""
-    judgements = judged.report.judgements
-    motions = trajectories(judged.exchanges, _trajectory_of)
-    diagnosis = motion_faults.diagnosis_of(judgements, motions, judged.base)
-    if not diagnosis.explanations and (keys := _too_fast(motions)):
-        explanation = Explanation(keys, motion_faults.SENTENCES[keys[0]], 1.0, 0.0)
-        diagnosis = replace(diagnosis, explanations=(explanation,))
-    return with_hints(judgements, diagnosis)
-
-
-def _too_fast(motions: Mapping[str, Trajectory]) -> tuple[str, ...]:
-    """Return the fault by which joints exceed their greatest speeds, () if none is known.
-
-    Of limits with another factor the largest speeds of several frames are alike.
-    """
-    for name, motion in motions.items():
-        twin = motions.get(name.replace(robot_motions.LIMITED_JUMP, robot_motions.JUMP))
-        if twin is None or twin is motion:
-            continue
-        fastest = _speed_ratios(motion).max(axis=1)
-        is_capped = (fastest >= ALIKE * fastest.max()).sum() > 1
-        if fastest.max() <= SPEEDING or is_capped:
-            continue
-        count = min(len(motion.q), len(twin.q))
-        is_same = np.abs(motion.q[:count] - twin.q[:count]).max() <= NO_DRIFT
-        return ("speed limits ignored" if is_same else "speed limits of iterations",)
-    return ()
-
-
-def _speed_ratios(motion: Trajectory) -> FloatArray:
+def speed_ratios(motion: Trajectory) -> FloatArray:
     """Return speeds as multiples of the greatest ones, (frame, joint)."""
     speeds = np.abs(motion.changes) / motion.inputs["h"]
     return np.asarray(speeds / motion.inputs["velocity_limits"])
@@ -126,11 +91,12 @@ def _findings(
         *_laps(motion),
         *_signs(motion, motions),
         *_velocities(motion),
-        *motion_faults.limit_laws(motion, motions.values()),
+        *limit_laws(motion, motions.values()),
     ]
 
 
-def _trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
+def motion_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
+    """Return an answer as a motion."""
     q = np.clip(outputs["q"], -FARTHEST, FARTHEST)
     return Trajectory(case, q, velocities=outputs.get("velocities"))
 
@@ -279,7 +245,7 @@ def _velocities(motion: Trajectory) -> Iterator[Finding]:
     """Yield whether joints keep their greatest speeds, and whether reported speeds are theirs."""
     h, changes, velocities = motion.inputs["h"], motion.changes, motion.velocities
     if "velocity_limits" in motion.inputs:
-        ratios = _speed_ratios(motion)
+        ratios = speed_ratios(motion)
         frame, joint = divmod(int(np.argmax(ratios)), ratios.shape[1])
         speed = float(np.abs(changes[frame, joint]) / h)
         yield _at(frame, finding("velocity limits kept", ratios.max(), 1.0 + 1e-6, index=joint,

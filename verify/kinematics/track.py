@@ -1,7 +1,6 @@
 """Following a curve: each frame an honest pose, on its target, near the frame before."""
 
-import itertools
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any, NamedTuple
@@ -12,22 +11,20 @@ from plumbob.reference import curves, rotation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.skeleton import Skeleton
 from plumbob.reference.tracking import track
-from plumbob.text.sentence import Sentence, sentence, with_code
+from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..cause_search import JudgedAnswers
 from ..contestant import Answer, Exchange
 from ..gaps import difference
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, TaskReport, Verdict
+from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
-from . import claims, pose_laws, problems, rounding, skeletons, sweeps
-from .faults import TABLE, SwitchFault
+from . import pose_laws, problems, rounding, skeletons, sweeps
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, predict_track
 from .problems import TargetProblem
-from .report import diagnosis_of, report, with_hints
+from .report import report
 from .skeletons import CaseFamily
 from .switches import Switches
 
@@ -131,107 +128,6 @@ def judge(
     return report(TASK, method.lower(), judgements)
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
-    """Return the faults that explain the motions, likely those of the inverse kinematics."""
-    exchanges, greeting, base = judged.exchanges, judged.greeting, judged.base or ()
-    judgements, method = judged.report.judgements, judged.report.method
-    comparable = {e.case.name: _comparable(e) for e in exchanges if frames_of(e)}
-    wrong = [
-        comparable[judgement.case.name]
-        for judgement in judgements
-        if judgement.case.name in comparable and _is_wrong(judgement)
-    ]
-    diagnosis = _diagnosis(exchanges, comparable, wrong, greeting, method, base)
-    answers = [
-        claims.values_of(e.case, [frame.pose for frame in frames_of(e)], {}, method, greeting)
-        for e in exchanges
-        if e.case.name in comparable
-    ]
-    diagnosis = claims.with_claims(diagnosis, judgements, answers, not base)
-    return with_hints(judgements, diagnosis)
-
-
-def _diagnosis(
-    exchanges: Sequence[Exchange],
-    comparable: Mapping[str, Exchange],
-    wrong: Sequence[Exchange],
-    greeting: Greeting,
-    method: str,
-    base: Sequence[SwitchFault],
-) -> Diagnosis:
-    """Return the faults that reproduce the motions of a method, or of any of the textbook's."""
-    bound = partial(_prediction_bound, greeting)
-    diagnoses = [
-        diagnosis_of(f"track {textbook}", list(comparable.values()), wrong, bound, base=base)
-        for textbook in METHODS
-        if method in ("", textbook)
-    ]
-    shares = [max((e.share for e in d.explanations), default=0.0) for d in diagnoses]
-    best = diagnoses[int(np.argmax(shares))] if diagnoses else Diagnosis()
-    explanations = tuple(_of_solves(explanation, base) for explanation in best.explanations)
-    if wrong and not any(explanation.share == 1.0 for explanation in explanations):
-        blended = _blended([frames_of(exchange) for exchange in exchanges])
-        explanations = (blended,) if blended else explanations
-    return replace(best, explanations=explanations)
-
-
-def _of_solves(explanation: Explanation, base: Sequence[SwitchFault]) -> Explanation:
-    """Return an explanation that says if its faults are also of single solves."""
-    keys = {fault.key for fault in base}
-    if not keys.issuperset(explanation.faults[0].split(" + ")):
-        return explanation
-    words = sentence(
-        "Its inverse_kinematics has the same mistake: {what}", what=explanation.sentence
-    )
-    return replace(explanation, sentence=words)
-
-
-def _blended(answers: Sequence[Sequence[Frame]]) -> Explanation | None:
-    """Return that effectors go a part of the way to each target, if they do.
-
-    They set out where they were, or from the target before, and end within the tolerance.
-    """
-    pairs = [pair for frames in answers for pair in itertools.pairwise(frames)]
-    pairs = [pair for pair in pairs if all(frame.case.facts["least"] == 0.0 for frame in pair)]
-    for origin, start_of in STARTS:
-        ways = np.array([frame.case.inputs["target"] - start_of(last) for last, frame in pairs])
-        moves = np.array([_effector(frame) - start_of(last) for last, frame in pairs])
-        part = float((ways * moves).sum() / max((ways * ways).sum(), 1e-300)) if pairs else 1.0
-        misses = np.linalg.norm(moves - part * ways, axis=-1)
-        if LEAST_PART < part < 1.0 - LEAST_PART and misses.max() <= 2.0 * TOLERANCE:
-            entry = TABLE["follow"][BLENDED]
-            words = sentence(
-                "{what} It goes {part:.0%} of the way from {where} to each target.",
-                what=Sentence(entry["sentence"], {}), part=part, where=origin,
-            )  # fmt: skip
-            return Explanation((BLENDED,), with_code(entry["code"], words), 1.0, 0.0)
-    return None
-
-
-def _effector(frame: Frame) -> FloatArray:
-    return np.asarray(frame.pose.positions[frame.case.inputs["effector"]])
-
-
-# Where effectors set out that go a part of the way to targets, by the frame before.
-STARTS: Sequence[tuple[Sentence, Callable[[Frame], FloatArray]]] = (
-    (sentence("the target before"), lambda last: np.asarray(last.case.inputs["target"])),
-    (sentence("where it was"), _effector),
-)
-BLENDED, LEAST_PART = "targets blended", 0.02
-
-
-def _is_wrong(judgement: CaseJudgement) -> bool:
-    """Return whether frames break a law, or jump."""
-    return judgement.verdict >= Verdict.WRONG or any(
-        entry.verdict and entry.law in ("continuity", CONTINUES) for entry in judgement.findings
-    )
-
-
-def _prediction_bound(greeting: Greeting, case: Case) -> float:
-    """Return the relative difference that rounding, enlarged from frame to frame, explains."""
-    return max(1e-8, 16.0 * sweeps.prediction_bound(greeting, case))
-
-
 def frames_of(exchange: Exchange) -> list[Frame]:
     """Return the frames of an answer; an empty list if it has no poses."""
     case, answer = exchange.case, exchange.answer
@@ -242,14 +138,6 @@ def frames_of(exchange: Exchange) -> list[Frame]:
         pose = pose_laws.read_pose({name: outputs[name][i] for name in names}, inputs, facts)
         frames.append(Frame(replace(case, inputs=inputs, facts=facts), pose))
     return frames
-
-
-def _comparable(exchange: Exchange) -> Exchange:
-    """Return the exchange with the outputs that variants predict."""
-    frames = [frame.pose.outputs for frame in frames_of(exchange)]
-    names = [name for name in frames[0] if all(name in frame for frame in frames)]
-    answer = Answer({name: np.array([x[name] for x in frames]) for name in names}, 0.0)
-    return Exchange(exchange.case, answer, answer)
 
 
 def _judge(exchange: Exchange, method: str, greeting: Greeting) -> CaseJudgement:
@@ -275,7 +163,7 @@ def _judge(exchange: Exchange, method: str, greeting: Greeting) -> CaseJudgement
 
 def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
     """Return whether frames start from the frame before, as far as a textbook's solver shows."""
-    answer, bound = _comparable(exchange).answer, _prediction_bound(greeting, exchange.case)
+    answer, bound = as_poses(exchange).answer, prediction_bound(greeting, exchange.case)
     assert isinstance(answer, Answer)
     warm, cold = (
         difference(predict_track(method, Switches(frame_start=start), exchange.case), answer.values)
@@ -317,3 +205,16 @@ def _continuity(poses: Sequence[AnsweredPose]) -> list[Finding]:
     frame, k = np.unravel_index(int(np.argmax(distances)), distances.shape)
     error, joint = distances[frame, k], int(poses[0].path[k])
     return [finding("continuity", error, JUMP, index=joint, frame=int(frame))]
+
+
+def prediction_bound(greeting: Greeting, case: Case) -> float:
+    """Return the relative difference that rounding, enlarged from frame to frame, explains."""
+    return max(1e-8, 16.0 * sweeps.prediction_bound(greeting, case))
+
+
+def as_poses(exchange: Exchange) -> Exchange:
+    """Return the exchange with the outputs that variants predict."""
+    frames = [frame.pose.outputs for frame in frames_of(exchange)]
+    names = [name for name in frames[0] if all(name in frame for frame in frames)]
+    answer = Answer({name: np.array([x[name] for x in frames]) for name in names}, 0.0)
+    return Exchange(exchange.case, answer, answer)

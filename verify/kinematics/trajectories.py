@@ -1,6 +1,6 @@
 """The frames of a robot's motion, or its one answer: errors, displacements of targets, jumps."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,8 +14,13 @@ from plumbob.reference.skeleton import Pose
 
 from ..case import Case
 from ..contestant import Answer, Exchange
+from ..judgement import Finding
+from ..laws import finding
+from .robot_faults import RIGHT
 from .robot_models import mechanism, tool_pose
 from .robot_motions import ITERATIONS
+from .robot_targets import LIMIT_STEP
+from .robot_textbook import ancestors
 
 # A frame is a jump if the joints move so many times as far as the reference has to from the same
 # frame, and this much farther [rad]: solvers that weight joints, or move in the null space, may.
@@ -165,3 +170,68 @@ def trajectories(
         if isinstance(exchange.answer, Answer)
         and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
     }
+
+
+def is_falling_at(motion: Trajectory) -> bool:
+    """Return whether the error of a pose has fallen from the start and can fall further."""
+    before, after = (np.linalg.norm(motion.twists(q), axis=-1) for q in (motion.previous, motion.q))
+    return bool(((after < REDUCED * before) & ~is_at_minimum(motion)).any())
+
+
+def limit_laws(motion: Trajectory, motions: Iterable[Trajectory]) -> Iterator[Finding]:
+    """Yield whether a single iteration from a joint's limit moves the joints that it should.
+
+    The joint has to stay in all motions: in one it may be clamped by chance.
+    """
+    facts = motion.case.facts
+    if motion.case.family != LIMIT_STEP or is_still(motion).all():
+        return
+    stays = [is_still(other)[other.case.facts["held"]] for other in motions
+             if other.case.family == LIMIT_STEP and other.case.facts["is_leaving"]]  # fmt: skip
+    yield finding("steps at limits", facts["is_leaving"] and all(stays), index=facts["held"])
+    is_other = is_still(motion) & (ancestors(motion.inputs) > 0.0)
+    other_joints = np.setdiff1d(np.flatnonzero(is_other), facts["held"])
+    yield finding("steps at limits, others", len(other_joints), index=facts["held"],
+                  others=", ".join(map(str, other_joints)))  # fmt: skip
+
+
+def is_still(motion: Trajectory) -> BoolArray:
+    """Return whether joints stay in the first frame, (joint)."""
+    return np.asarray(np.abs(motion.changes[0]) <= EXACT)
+
+
+# Errors that fall to less than this share have been reduced.
+REDUCED = 0.9
+
+
+# Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
+EXACT, SAME_SPEED = 1e-9, 1e-3
+
+
+def is_at_minimum(motion: Trajectory) -> BoolArray:
+    """Return whether no joint off its limits would reduce the error, (frame).
+
+    Solvers weigh rotations as they like: some weight may make it the least.
+    """
+    e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
+    J = J * ~motion.at_limits[:, None, :]
+    linear, angular = (
+        np.einsum("fij,fi->fj", J[:, part], e[:, part]) for part in (slice(3), slice(3, 6))
+    )
+    lengths = np.maximum((angular * angular).sum(axis=-1), 1e-300)
+    balance = np.clip(-(linear * angular).sum(axis=-1) / lengths, *SQUARED_WEIGHTS)
+    is_least = np.zeros(len(e), dtype=bool)
+    for square in (np.ones(len(e)), balance):
+        rows = np.repeat(np.stack([np.ones(len(e)), np.sqrt(square)], axis=-1), 3, axis=-1)
+        gradient = np.linalg.norm(linear + square[:, None] * angular, axis=-1)
+        size = np.linalg.norm(J * rows[..., None], axis=(1, 2))
+        is_least |= gradient <= STATIONARY * size * np.linalg.norm(e * rows, axis=-1)
+    return is_least
+
+
+# An error is least where its gradient is this small, relative to error and Jacobian.
+STATIONARY = 0.01
+
+
+# The squares of the weights that solvers give rotations [m^2].
+SQUARED_WEIGHTS = (1e-3, 1e2)
