@@ -14,6 +14,7 @@ T = TypeVar("T")
 Function = TypeVar("Function", bound=Callable[..., Any])
 # A reading of the processor's clock takes up to 2 µs: below 1 % of a call as long as this [s].
 LONG = 2e-4
+# Solves whose median is the overhead: two disturbed solves do not change the median.
 REPEATS = 5
 # The time of a library's functions while an overhead is measured [s], else nothing.
 _library_seconds: list[float] = []

@@ -57,8 +57,8 @@ FIXED, HINGE, SLIDE, BALL, FREE = range(5)
 # The number of coordinates and of degrees of freedom of each kind.
 WIDTHS = np.array([0, 1, 1, 4, 7])
 FREEDOMS = np.array([0, 1, 1, 3, 6])
-# A coordinate may be this far outside its limits [rad or m] and still count as within: a nanometre
-# at an arm of one metre, and a million roundings, which angles and mimic joints may have lost.
+# A coordinate may be this far outside its limits [rad or m] and still count as within. On an arm of
+# a metre this is a nanometre, and some million roundings.
 LIMIT_TOLERANCE = 1e-9
 # A record of a joint, for kernels.
 JOINT = np.dtype(

@@ -33,7 +33,7 @@ from .times import ERROR_RATE, FLOOR, UNKNOWN, Drift, assumed_drift, pairs_neede
 TimePairs = dict[tuple[RowKey, str], list[tuple[float, float]]]
 TimeRatios = dict[tuple[RowKey, str], TimeRatio]
 
-SEED = 20130
+SEED = 20130  # of the order in which a pair is measured
 PREFIX = "plumbob-rerun-"
 METHOD = (
     "Both revisions are measured side by side in fresh processes, {pairs} times each, in random "

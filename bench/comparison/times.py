@@ -17,15 +17,19 @@ from .rows import ChangeVerdict, Pair, RowChange, RowKey, TimeRatio
 
 Floats = NDArray[np.float64]
 
-# The probability of calling any row faster or slower although no row is.
+# The probability of calling any row faster or slower although no row is, as usual.
 ERROR_RATE = 0.05
+# Of intervals, as in every table.
 CONFIDENCE = 0.95
+# Of a bootstrap: the standard deviation of 200 is known to 5 %, 1 / sqrt(2 * 199).
 RESAMPLES = 200
-# The least drift, however steady the machine seems; and the drift if not measured.
-FLOOR, UNKNOWN = 0.01, 0.1
-# Times whose ratio is surely within this margin of 1 are the same.
+# The least drift, however steady the machine seems. A round number: a smaller change is no news.
+FLOOR = 0.01
+# The drift if not measured; a smaller change of a time is then called neither slower nor faster.
+UNKNOWN = 0.1
+# Times whose ratio is surely within this margin of 1 are the same: a user hardly feels 10 %.
 MARGIN = 0.1
-# Fewer rounds have no interval, and are not compared.
+# Times with fewer rounds are not compared: their medians by the bootstrap are too few.
 ROUNDS = 5
 
 

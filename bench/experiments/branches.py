@@ -30,6 +30,7 @@ from ..problems.robots import ROBOTS, UnableError, is_installed, robot, title
 SUITE = "ik"
 # The task of records.
 BRANCHES = "branches"
+# Arms of six have isolated solutions, to be counted.
 HINGES = 6
 # Targets of a stratum per target of a scale, and random starts of the search at a target.
 _TARGETS, STARTS = 0.05, 128

@@ -31,13 +31,17 @@ from ..problems.curves import CURVE
 
 # The task of records.
 CHAIN = "chain"
+# The default of `solve_ik` [m].
 TOLERANCE = 1e-4
 # Beyond reach: of the distance from the closest pose; small, to require a straight chain.
 BEYOND_TOLERANCE = 1e-6
+# Ten times the default of `solve_ik`: slow methods show their convergence.
 MAX_ITERATIONS = 1000
-# Targets in a stratum, and out of reach, per target of a scale, and the least number. A solver in
-# Python may need seconds for a target that takes all iterations.
-_TARGETS, _TARGETS_BEYOND, _LEAST_TARGETS = 0.25, 0.05, 3
+# Targets in a stratum, and out of reach, per target of a scale. A solver in Python may need seconds
+# for a target that takes all iterations, as each target out of reach does.
+_TARGETS, _TARGETS_BEYOND = 0.25, 0.05
+# The least number of either.
+_LEAST_TARGETS = 3
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 
 
@@ -137,7 +141,8 @@ from ..tables.columns import (
 from ..tables.results import Results, by_problem, counted, grouped, label
 from ..tables.table import Column, Summary, words
 
-# A chain counts as straight if no joint is off the line by more than this share of the reach.
+# A chain counts as straight if no joint is off the line by more than this share of the reach. A
+# round number: a pixel of a chain drawn with a hundred.
 STRAIGHT = 0.01
 # Iterations at which targets are counted.
 COUNTED = np.unique(np.logspace(0, 3, 61).round())

@@ -34,7 +34,8 @@ SUITE = "tracking"
 DRIFT = "drift"
 # The modes in which the frames of a curve are solved.
 COLD, WARM, NEAREST = "cold", "warm", "nearest"
-# The starts of a frame, of which the nearest solution is taken, and the seed of random starts.
+# The starts of a frame, of which the nearest solution is taken: as many as an arm with a wrist has
+# solutions. The seed of random starts.
 STARTS, _SEED = 8, 2014
 # A quick run on a robot has this solver only: the others take long to compile.
 ROBOT_SOLVER = "levenberg_marquardt"

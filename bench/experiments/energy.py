@@ -14,9 +14,11 @@ from ..harness.values import Floats1, Values
 # Particles along a side, and the dampings of the springs [N s/m].
 SIZE = 5
 DAMPINGS = {"undamped": 0.0, "damped": 0.2}
+# A frame [s]; steps of nearly three minutes, of which every tenth is drawn.
 H, STEPS, EVERY = 1 / 60, 10_000, 10
 # Steps after which the cloth hangs well below its start, near its rest.
 FALLING = 120
+# The default of `ImplicitEuler`.
 TOLERANCE = 1e-10
 # Two of ours, and MuJoCo's by its names.
 INTEGRATORS = (

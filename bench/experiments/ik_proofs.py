@@ -28,6 +28,7 @@ WITHIN_REACH, ANYWHERE = "within reach", "anywhere"
 # The numbers of `IKCoverage`: proofs, and why there is none.
 COVERED, IMPOSSIBLE = 0, 1
 CAUSES = {2: "too few joints can move", 3: "singular", 4: "no solution nearby", 5: "at a limit"}
+# The tolerance of the robots' suite [m], [rad], and the default restarts of `solve_ik`.
 TOLERANCE, RESTARTS = 1e-3, 20
 # Targets in a stratum per target of a scale.
 _TARGETS = 0.025

@@ -20,9 +20,10 @@ from ..harness.values import Values
 from ..peers import catalogue
 from ..problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
 
-# Stiffness of the cloths [N/m], gravity [m/s²], and the converged frames before the step [s].
+# Stiffness of the cloths [N/m].
 STIFFNESSES = (1e3, 1e4, 1e5)
-GRAVITY = 9.81
+GRAVITY = 9.81  # [m/s²]
+# The converged frames before the step: their length [s] and number.
 FRAME, FRAMES = 1 / 30, 15
 # Iterations of a quick solver; solvers allowed more than `SLOW` count as slow.
 USUAL, SLOW = 10, 1000

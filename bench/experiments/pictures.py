@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 # The tasks of records.
 ARM, CLOTH = "arm", "cloth"
 ARM_MOTION, CLOTH_MOTION = "motion of the arm", "motion of the cloth"
+# Poses of the arm in a picture, and states of the cloth.
 GHOSTS, FRAMES = 9, 6
 # Motions to play: solvers of inverse kinematics; step solvers with their iteration limits.
 FOLLOWING = ("ccd", "fabrik", "levenberg_marquardt")

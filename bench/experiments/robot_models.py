@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SUITE = "robot_models"
 # The task of records on the bench's own robots in engines of peers.
 PEERS = "peers"
-ROBOT_CONFIGURATIONS = 100
+ROBOT_CONFIGURATIONS = 100  # random, of a robot
 
 
 class FileWords(Values, frozen=True, kw_only=True):

@@ -47,6 +47,7 @@ from ..problems.robots import (
 # A solver with a time limit, whose answers differ from run to run, solves all targets so often.
 REPEATS = 3
 SUITE = "ik"
+# A millimetre and a milliradian, more than ten times what industrial arms repeat.
 TOLERANCE = Tolerance(1e-3, 1e-3)
 # Targets in a stratum, and out of reach of a robot, per target of a scale. Targets out of reach are
 # few: solvers try all of their restarts, which takes long.
@@ -55,6 +56,7 @@ _TARGETS, _TARGETS_BEYOND = 0.05, 0.03
 _PER_TIMED, _PER_TIMED_BEYOND = 10, 3
 # Time at least four targets of a stratum: a clear difference is then beyond chance.
 _LEAST_TIMED = 4
+# The median of three leaves out a disturbed round; targets out of reach take too long for three.
 ROUNDS, ROUNDS_BEYOND = 3, 1
 # Digits kept of times and residuals: more would fill the disk with noise.
 _DIGITS = 5

@@ -21,9 +21,10 @@ from .record import FIRST_TARGETS
 from .timing import Job, answers, first_targets, times_in_turns
 
 SUITE = "ik"
-# The figure shows the residuals of the first HISTORY iterations. A user's solver is followed over
-# fewer targets and iterations: each iteration count takes a solve from the start.
+# The figure shows the residuals of the first HISTORY iterations.
 HISTORY = 200
+# A user's solver is followed over fewer targets and iterations: each iteration count takes a solve
+# from the start.
 FOLLOWED_TARGETS, FOLLOWED_ITERATIONS = 10, 20
 # Time every fourth target, at most 20, three times each.
 PER_TIMED, ROUNDS, MAX_TIMED = 4, 3, 20

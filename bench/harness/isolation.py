@@ -19,8 +19,9 @@ from plumbob.process import child
 from ..peers.protocol import OwnTime, describe
 from .progress import Progress, announce, listening
 
-# A worker silent for this long [s] is ended; before ready, a worker may compile.
+# A worker silent for this long [s] before the first target is ended; it may compile.
 START_PATIENCE = 180.0
+# And on a target, for which a solver in Python may need seconds.
 TARGET_PATIENCE = 60.0
 Calculate = Callable[..., Mapping[str, Any]]
 _START = "import plumbob.bench.harness.isolation as i; i.main()"

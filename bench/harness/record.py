@@ -24,7 +24,7 @@ from . import values
 from .experiment import kind_of
 from .old_records import OldLine, measured_of
 
-FORMAT = 4
+FORMAT = 4  # raised when older readers would misread a record
 FILE_NAME = "records.jsonl"
 # Suite name of the records that mark a suite as complete.
 FINISHED = "finished"

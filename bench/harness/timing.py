@@ -45,7 +45,7 @@ from .isolation import (
 from .progress import TROUBLE, Progress
 from .record import FIRST_TARGETS
 
-_SEED = 1986
+_SEED = 1986  # of restarts
 # Times of slow solves are sent whenever their sum exceeds this [s], lest a worker seem silent.
 _SILENCE = 0.5
 # A user's solver may take so long for a target, on average, and at least so long in all [s].

@@ -5,7 +5,7 @@ import numpy as np
 from ..problems.robots import LIMIT_TOLERANCE, links
 from .protocol import BenchRobot, FloatArray
 
-REVOLUTION = 2.0 * np.pi
+REVOLUTION = 2.0 * np.pi  # [rad]
 
 
 def first_within(robot: BenchRobot, solutions: FloatArray) -> tuple[FloatArray | None, bool]:

@@ -21,6 +21,7 @@ from .protocol import (
 )
 from .user_solver import ROBOT_TASK, Spec
 
+# Twice the default of `solve_ik`: a count of iterations is each solver's own.
 ITERATIONS = 200
 
 

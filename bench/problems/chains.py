@@ -8,12 +8,12 @@ import numpy as np
 from plumbob.reference import Skeleton, rotation, scenes
 from plumbob.reference.arguments import FloatArray, IndexArray, choice
 
-BALLS = 10
+BALLS = 10  # joints, as in Aristidou & Lasenby 2011, table 1
 BEYOND = "beyond"
 
 # How far targets lie from the root, as shares of the reach; uniform within the shell.
 STRATA = {"near": (0.05, 0.4), "far": (0.6, 0.95), "edge": (0.99, 0.9999), BEYOND: (1.01, 2.0)}
-SEED = 1986
+SEED = 1986  # of the targets
 
 
 @dataclass(frozen=True)

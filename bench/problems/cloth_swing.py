@@ -6,11 +6,13 @@ from typing import Any
 
 from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 
+# The lab's own: [N/m], and a frame [s].
 STIFFNESS, H = 100.0, 1 / 60
 # The cloth falls for three seconds; the steps of the next second are measured.
 FALLING, STEPS = 180, 60
 # A step in the middle of the swing.
 MIDDLE = FALLING + STEPS // 2
+# The default of `ImplicitEuler`.
 TOLERANCE = 1e-10
 
 

@@ -19,17 +19,18 @@ CURVE = "curve"
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
 CUSTOM = "plumb_bob"
 CUSTOM_SAMPLES = 1200
-MIN_SPACING = 0.01
-MAX_SPACING = 0.02
+# Of neighbouring samples [m].
+MIN_SPACING, MAX_SPACING = 0.01, 0.02
+# Distances of targets out of reach, over the reach: from nearly straight to far.
 BEYOND = (1.01, 2.0)
-_SEED = 1986
+_SEED = 1986  # of these targets
 # Closed curves, and where a robot draws them.
 ARM_CURVES = ("circle", "heart", "triangle", "star")
 ROBOT, ROBOT_CURVES = "iiwa14", ("circle", "heart")
 # A pose with the elbow bent and the wrist over the table [°], and where the curves are drawn [m].
 # Curves are upright, in front of the robot, and small enough to be all within reach.
 _START = (0.0, 35.0, 0.0, 80.0, 0.0, 65.0, 0.0)
-_CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4
+_CENTRE, _SCALE = (0.5, 0.0, 0.5), 0.4  # scale: size of a curve over its size in the lab
 # Frames of the heart where drawn several times.
 DRIFT_FRAMES = 60
 

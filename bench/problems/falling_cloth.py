@@ -20,11 +20,13 @@ from plumbob.reference.mass_spring import stiffness_matrix
 
 from .own import OwnProblem
 
-SIDE, MASS, GRAVITY = 2.0, 1.0, 9.81
+SIDE, MASS, GRAVITY = 2.0, 1.0, 9.81  # [m], [kg], [m/s²]
+# From the lab's cloth to a hundred times its stiffness [N/m].
 STIFFNESSES = (1e2, 1e3, 1e4)
-FRAME = 1 / 60
+FRAME = 1 / 60  # [s]
+# Frames of the fall: after 0.4 s the cloth is in motion, and neither straight nor folded.
 FALLING = 24
-_SEED = 2013
+_SEED = 2013  # of the uneven start
 # Steps of the fall, in units of the limit of stability; a spring's damping over a particle's mass
 # [1/s] meanwhile; the random displacement at first, in units of the spacing.
 _FALL_MARGIN, _FALL_DAMPING, _UNEVEN = 1.5, 20.0, 1e-3

@@ -14,7 +14,7 @@ from plumbob.reference.rotation import roll_pitch_yaw
 from . import own
 from .robots import TWO_REVOLUTIONS, BenchRobot, chain_of
 
-_SEED = 1986
+_SEED = 1986  # of random poses
 
 
 def robot(path: Path, name: str, effector: str | None) -> BenchRobot:

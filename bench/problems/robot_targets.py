@@ -23,12 +23,13 @@ STRATA = {
     "near singular": "the twentieth with the smallest least singular value of the Jacobian",
     "at a limit": "uniform in joint space, then one joint put at one of its limits",
 }
-# Poses in the pool for each target of a stratum, and the share in an extreme stratum.
+# Poses in the pool for each target of a stratum.
 _POOL = 40
+# The share of the pool in an extreme stratum: a twentieth, two poses for each target.
 _EXTREME = 0.05
 # Cells a side of the grid by which effectors are spread evenly over space.
 _CELLS = 12
-SEED = 1986
+SEED = 1986  # of the targets
 
 
 @functools.lru_cache(maxsize=16)

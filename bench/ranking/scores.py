@@ -23,11 +23,13 @@ from ..tables.results import Results, grouped, listed
 from ..tables.table import words
 
 STARTS = (ONE_START, PORTFOLIO, RESTARTS)
-# The least time of an unsolved target in a mean of times [s].
+# The least time of an unsolved target in a mean of times [s]. A round number: a hundred times the
+# longer of the times in headlines, more than a frame of any animation or controller.
 PENALTY = 0.1
 # The probability at which two solvers differ.
 ALPHA = 1.0 - metrics.CONFIDENCE
-# Added to times before their geometric mean is taken: microseconds must not decide [s].
+# Added to times before their geometric mean is taken: microseconds must not decide [s]. A tenth of
+# the shorter time in headlines: a target of 1 µs counts as much as a target of 0.
 SHIFT = 1e-5
 # Solvers with different robots of a group are compared over the two largest sets.
 SETS = 2

@@ -19,7 +19,7 @@ from ..motion.motion import Moving, Scene, decades, length
 
 # Moments of a picture.
 MOMENTS = 4
-MARGIN = 0.1
+MARGIN = 0.1  # around a drawing, over its size
 ON_WHITE = {**PARAMETERS, "savefig.facecolor": "white", "figure.facecolor": "white"}
 Progress = Callable[[int, int], None]
 

@@ -18,7 +18,7 @@ STEP, MOTION = "mass_spring_step", "mass_spring_motion"
 # The tasks for scenes: a scene needs any of these.
 ARM_TASKS, CLOTH_TASKS = (TRACK, REACH), (STEP, MOTION)
 SYSTEM = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
-TOLERANCE, MAX_ITERATIONS = 1e-4, 100
+TOLERANCE, MAX_ITERATIONS = 1e-4, 100  # the defaults of `solve_ik`
 # The step of a cloth [s].
 H = 1 / 60
 Progress = Callable[[int, int], None]

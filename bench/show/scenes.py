@@ -20,10 +20,10 @@ from .scene_solver import ARM_TASKS, CLOTH_TASKS, H, SceneSolver
 ARM, CLOTH = "arm", "cloth"
 SCENES = (ARM, CLOTH, *reference.curves)
 HTML, SVG, BVH = ".html", ".svg", ".bvh"
-SECONDS = 5
+SECONDS = 5  # of a motion
 # A page shows every third step of a cloth; the frames of an arm are thinned to as many.
 EVERY = 3
-RATE = 20
+RATE = 20  # frames of a second
 FRAMES = SECONDS * RATE
 # The solver of the exact implicit motion of a cloth, to which others are compared.
 EXACT = "newton"

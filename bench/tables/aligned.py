@@ -13,7 +13,7 @@ from plumbob.text.printable import harmless
 
 from .table import Table, best_cells, column_widths, naming, without_empty, words
 
-GAP = 2
+GAP = 2  # letters between columns
 # Longer words may be broken, into parts of the next length where columns do not fit otherwise.
 _PARTS = (24, 10, 5)
 

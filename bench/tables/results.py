@@ -14,7 +14,8 @@ from ..harness.record import Record, on_record
 from ..peers import catalogue
 from .table import words
 
-# The relative precision of a displayed time, given the drift of its machine.
+# The relative precision of a displayed time, given the drift of its machine: half of the margin
+# within which `plumbob compare` calls times the same.
 PRECISION = 0.05
 # If more solvers tie with the first, a sentence gives only their number.
 NAMED_TIES = 3

@@ -18,8 +18,8 @@ INTEGRATORS = {
 JOINTS = {"slide": mujoco.mjtJoint.mjJNT_SLIDE, "hinge": mujoco.mjtJoint.mjJNT_HINGE}
 # Above this number of particles MuJoCo's default estimate of its memory is excessive.
 LARGE_SYSTEM = 1000
-# Then its memory [bytes]: a base, and four times the use of two bytes for each pair of particles
-# that was measured for up to 10,000.
+# Then its memory [bytes]: a base, and four times the measured use, two bytes for each pair of up to
+# 10,000 particles.
 BASE_MEMORY, PAIR_MEMORY = 2**27, 8
 # MuJoCo's default of 100 iterations of "discrete" does not suffice for larger systems.
 ITERATIONS = 5000

@@ -16,7 +16,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.objective import Objective
 from plumbob.reference.mass_spring import MassSpring, State
 
-# Decimal digits: 25 of an error, and 15 that the sums of a gradient may cancel.
+# Decimal digits: 25 of an error, and 15 for digits cancelled in a gradient.
 DIGITS = 40
 # A correction gains some 15 digits: random networks of 5 to 108 particles take two.
 REFINEMENTS = 20

@@ -20,7 +20,7 @@ from ..engines.robot_engine import RobotEngine, UnreadableError
 from ..verdict import Comparison
 from .models import RobotFile, comparable, moving_joints, random_coordinates
 
-# Random configurations of each robot. A wrong axis or origin shows in any of them.
+# Random configurations of each robot. A wrong axis or origin shows in any configuration.
 CONFIGURATIONS = 5
 # Jacobians are compared for a few links at a time, with at most this many numbers in all.
 PART = 2**22

@@ -7,7 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import Any
 
-INTERRUPTED = 130
+INTERRUPTED = 130  # as shells report a program ended by SIGINT, 128 + 2
 
 
 def main() -> None:

@@ -12,6 +12,7 @@ import typer
 from .entry_point import INTERRUPTED as INTERRUPTED
 
 REPORT = Path("report")
+# Exit codes; the last as shells report a program ended by SIGPIPE, 128 + 13.
 SUCCESS, FAILED, MISUSED, UNREAD = 0, 1, 2, 141
 
 

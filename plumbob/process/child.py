@@ -37,7 +37,7 @@ STDERR_LENGTH = 4096
 IDLE = 0.1
 # Time for a process to answer or to end after closing a pipe [s].
 GRACE = 1.0
-_CHUNK = 1 << 18
+_CHUNK = 1 << 18  # bytes of a read
 # Limit of the duration of a call over its limit of processor time: the processor is shared.
 _WALL = 10
 # Limit of the time to load and compile before the first call [s].

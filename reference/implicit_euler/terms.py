@@ -13,7 +13,7 @@ from ..mass_spring import spring_frame, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
 EPS = float(np.finfo(float).eps)
-# Bound on the rounding error of the gradient, relative to the norm of its terms: a term is known to
+# Bound on the rounding error of the gradient, relative to the norm of its terms. A term is known to
 # 14 EPS (see `certificate`), and the sum of 100 springs at a particle to 50 EPS.
 SUM_ROUNDING = 64 * EPS
 # Covers the rounding error of the upper bound of the floor itself.

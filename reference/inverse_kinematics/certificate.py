@@ -60,15 +60,15 @@ QUATERNION_ROUNDINGS, OFFSET_ROUNDINGS = 48, 130
 # Factor to cover the rounding errors of the bounds themselves.
 SLACK = 1.0 + 1e-8
 # The answer is polished to this distance [m] and angle [rad]. From there Newton steps, which square
-# the error, come to rounding with the first; the others repair a step along a limit.
+# the error, come to rounding with the first; further steps repair a step along a limit.
 POLISHED, NEWTON_STEPS = 1e-11, 3
 # A Newton step by more leads to no solution [rad or m].
 LARGEST_STEP = 1e9
 # A joint this near to its limit stays where it is [rad or m]. A larger margin frees fewer joints
 # and proves fewer poses, and no pose wrongly.
 MARGIN = 1e-7
-# Displacements [rad or m] for which lengths of slides and angles of mimic joints are bounded; a
-# proof that needs a larger one is not made.
+# Displacements [rad or m] for which lengths of slides and angles of mimic joints are bounded. No
+# proof is made by larger displacements.
 EXTENT = 1.0
 # |F| of a point that is a solution up to rounding. The number only words the reason why a proof
 # fails.

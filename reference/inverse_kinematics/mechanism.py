@@ -31,8 +31,8 @@ from ..quaternion import (
 )
 from .chain import POSITION_ROUNDING
 
-# An angle between rotations counts as much as a distance of the angle times this part of the reach:
-# the points of a mechanism are, on average, half the reach away from an axis.
+# An angle between rotations counts as much as a distance of the angle times this part of the reach.
+# On average the points of a mechanism are half the reach away from an axis.
 LEVER = 0.5
 # A record of an effector, for kernels.
 EFFECTOR = np.dtype(

@@ -37,7 +37,7 @@ ROUNDINGS = 3000  # of UNIT by a joint, as derived above
 # The accuracy of a shell, over the length of the chain, and the boxes for a shell and for a target.
 # All are limits of time: a bound with fewer boxes is wider, and as valid.
 ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 20_000, 2_000
-# Factor to cover the rounding errors of widths and lengths, some thousand of them.
+# Factor to cover the rounding errors of widths and lengths, some thousand.
 WIDER = 1.0 + 1e-12
 # Axes count as parallel if the squared sine between them is smaller.
 PARALLEL = 1e-6

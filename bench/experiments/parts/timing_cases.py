@@ -52,7 +52,7 @@ LONGER = 5
 # The limbs of a body, each a joint to start from and a number of joints: spine, legs, arms.
 LIMBS = ((0, 5), (0, 5), (0, 5), (4, 7), (4, 7))
 ROBOTS = ("iiwa14", "human", CHARACTER)
-POSES = 1_000
+POSES = 1_000  # of a batch
 Calls = dict[str, Callable[[FloatArray], Any]]  # by subject
 STRATA = ("near", "far")
 # Plain Python takes milliseconds a solve; the first targets of the same set are enough.

@@ -27,7 +27,7 @@ PEER = Peer(
     use="all solutions of six hinges",
 )
 
-MAXIMUM_HINGES = 6
+MAXIMUM_HINGES = 6  # of its closed forms
 
 
 def prepare(robot: BenchRobot, tolerance: Tolerance) -> SolveFactory:

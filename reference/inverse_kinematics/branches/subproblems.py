@@ -21,7 +21,7 @@ CLAMPED = 1e-7
 # The certainty of a number of roots: certain; in doubt; every angle is a root.
 CERTAIN, DOUBTFUL, EVERY_ANGLE = range(3)
 # The number is in doubt with a cosine within this of 1, a quartic as near to zero, or vectors as
-# near to the axis: two roots are then within 2.8e-4 rad of each other. Doubt only starts a search.
+# near to the axis. Two roots are then within 2.8e-4 rad of each other. Doubt only starts a search.
 NEARLY_DOUBLE = 1e-8
 # A vector has no angle about an axis if its part across the axis is no longer than this.
 SINGULAR = 1e-7
