@@ -2,22 +2,13 @@
 
 Let mu > 0 be a lower bound of the smallest eigenvalue of H, the Hessian of g at x over the free
 particles. Let eta be an upper bound of |H^-1 grad g(x)|, the length of the Newton step. Let L be a
-Lipschitz constant of the Hessian within 2 eta of x. Then
+Lipschitz constant of the Hessian within 2 eta of x. Then (Kantorovich 1948)
 
     L eta < mu / 2  =>  a minimiser lies within d = 2 eta / (1 + (1 - 2 L eta / mu)^1/2),
 
-and no other stationary point within 2 eta (Kantorovich 1948). Proof: let N(z) = z - H^-1 grad g(z).
-Within 2 eta of x, |N'(z)| = |H^-1 (H - H(z))| <= 2 L eta / mu < 1. Integration from x gives |N(z) -
-x| <= eta + L |z - x|² / (2 mu) <= 2 eta: N contracts this ball into itself and has a single fixed
-point there. The distance t of the fixed point from x has t <= eta + L t² / (2 mu) and t <= 2 eta <
-mu / L. So t <= d, the smaller root, and H(z) >= mu - L d = mu (1 - 2 L eta / mu)^1/2 > 0 there.
-
-The bound is never worse than the bound by convexity of g on a ball of radius 2 |grad g(x)| / mu,
-since |H^-1 grad g(x)| <= |grad g(x)| / mu. It is sharper where stiffnesses differ by direction.
-
-The bounds hold in exact arithmetic for the g that the floating-point inputs define. They include
-the rounding errors of x_n + h v_n, the effective springs, the gradient, the Hessian, its Cholesky
-factor (Rump 2006, "Verification of Positive Definiteness") and the linear solve.
+and no other stationary point within 2 eta. docs/certificates.md has the proof. The bounds include
+the rounding errors of the effective springs, gradient, Hessian, Cholesky factor (Rump 2006) and
+linear solve.
 """
 
 import contextlib

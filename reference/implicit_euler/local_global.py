@@ -3,35 +3,16 @@
 Liu, Bargteil, O'Brien, Kavan 2013, "Fast Simulation of Mass-Spring Systems". The local step finds
 the optimal d for the current x; the global step minimises g for constant d, so g never grows:
 
-    (M + h² L) x_next = h² J d + M y + h² f_ext.
+    x_next = (M + h² L)^-1 (h² J d + M y + h² f_ext) = x - (M + h² L)^-1 grad g(x).
 
-Since grad g(x) = (M + h² L) x - (h² J d + M y + h² f_ext) for the optimal d, the same step is
-
-    x_next = x - (M + h² L)^-1 grad g(x),
-
-which is accurate for small corrections and does not move the pins. The lab's version makes one
-iteration.
-
-Chebyshev's semi-iterative method accelerates these iterations. Wang 2015, "A Chebyshev
-Semi-Iterative Approach for Accelerating Projective and Position-based Dynamics", computes the next
-iterate from x_k, x_k-1 and a local/global step s as
+Chebyshev's semi-iterative method accelerates these iterations (Wang 2015), with x_k, x_k-1 and a
+local/global step s:
 
     x_k+1 = w_k+1 (c s + x_k - x_k-1) + x_k-1,    w_1 = 1, w_2 = 2 / (2 - R²),
-                                                  w_k+1 = 4 / (4 - R² w_k),
+                                                  w_k+1 = 4 / (4 - R² w_k).
 
-after some plain iterations, since the directions of springs change most at first. Near the solution
-a plain iteration multiplies the components of the error by factors from 0 to rho < 1: M + h² L
-bounds the Hessian of g from above. Steps relaxed by c = 1 + R with R = rho / (2 - rho) have factors
-from -R to R, the interval for which the weights are optimal. Wang takes c = 1 and R = rho, for
-factors from -rho to rho.
-
-rho is estimated, first from the ratio of two plain steps and then from the decay of the steps: k
-accelerated iterations should reduce the steps by 1 / cosh(k arcosh(1/R)). If the reduction is B
-times weaker, the estimate becomes R cosh(arcosh(B) / k) (Hageman and Young 1981, "Applied Iterative
-Methods", section 5.4).
-
-Far from the solution the theory does not hold: a plain iteration, which never increases g, replaces
-an accelerated iteration that would.
+The relaxation c = 1 + R and the estimate of R from the decay of the steps are derived in
+docs/implicit_euler.md.
 """
 
 import math

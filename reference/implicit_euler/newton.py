@@ -1,22 +1,16 @@
 """Newton's method on g with its exact Hessian, and Gauss-Newton.
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
-until the sum is positive definite, a Levenberg shift in the metric of M.
+until the sum is positive definite, a Levenberg shift in the metric of M. An end is accepted only
+without a negative eigenvalue, which costs a last factorisation.
 
-Such steps leave a saddle point where the gradient shows a way out, but not at a squeezed straight
-rod. An end is therefore accepted only without a negative eigenvalue. The Hessian is factorised once
-more, unless the Hessians of the last two iterates were positive definite, as in ordinary steps.
-
-Gauss-Newton linearises the springs at the start of the step. At x_n the dampers of E are at rest
-length: grad g(x_n) = -h (M v_n + h f). With their Hessian without geometric terms the step h (v_n +
-dv) = -(M + h C + h² J' k J)^-1 grad g(x_n) is
+Gauss-Newton linearises the springs at the start of the step (Baraff and Witkin 1998, without
+geometric stiffness; MuJoCo's integrator `discrete`):
 
     (M + h C + h² J' k J) dv = h (f - h J' k J v_n),
 
-where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. This is a step of
-Baraff and Witkin 1998, "Large Steps in Cloth Simulation", without geometric stiffness, and MuJoCo's
-integrator `discrete`. Springs are linearised at x_n for moving pins too: the displacement of the
-pins adds h² J' k J (x_pins - x_n) to the gradient at the free particles.
+where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. See
+docs/implicit_euler.md.
 """
 
 from collections.abc import Iterator

@@ -1,19 +1,14 @@
 """The objective g that an implicit Euler step minimises: value, gradient, Hessian, rounding error.
 
-Implicit Euler requires M (x - y) = h² f(x), where y = x_n + h v_n. With f = -grad E this is
-grad g(x) = 0 for (Liu et al. 2013)
+With y = x_n + h v_n, and f_ext the sum of gravity and external forces (Liu et al. 2013)
 
-    g(x) = 1/2 (x - y)' M (x - y) + h² E(x),    E(x) = sum of k/2 (l(x) - r)² - f_ext' x,
+    g(x) = 1/2 (x - y)' M (x - y) + h² E(x),    E(x) = sum of k/2 (l(x) - r)² - f_ext' x.
 
-where f_ext is the sum of gravity and external forces and l_n the length of a spring at x_n. A
-damper adds c/(2h) (l(x) - l_n)² to E. A damped spring hence acts within the step as a spring of
-stiffness k + c/h and rest length (k r + c l_n/h) / (k + c/h). The damper of a tension-only spring
-also acts while the spring is slack. It becomes a spring of its own, of stiffness c/h and rest
-length l_n. The force of a damper in a step is therefore -(c/h) (l - l_n) u, not the -c ((v_i -
-v_j)·u) u of explicit integrators. `mass_spring.damper_forces` compares the two.
-
-Pinned particles are not variables: y holds their positions at the end of the step, and their rows
-of the gradient are zero.
+A damper adds c/(2h) (l(x) - l_n)² to E, l_n the length at x_n. A damped spring hence acts as a
+spring of stiffness k + c/h and rest length (k r + c l_n/h) / (k + c/h), and the damper of a
+tension-only spring as a spring of its own. Pinned particles are not variables: y holds their
+positions at the end of the step, and their rows of the gradient are zero. See
+docs/implicit_euler.md.
 """
 
 import functools

@@ -61,32 +61,10 @@ def solve_ik(
     first bent, always alike. All joints keep their limits, also joints that move no effector; a
     start outside its limits is brought within.
 
-    On limited joints Levenberg-Marquardt from a single start fails mostly where a limit stops a
-    joint. The solver is therefore a fixed portfolio of phases without random numbers (Huberman,
-    Lukose & Hogg 1997). The first phase, the only one with `phases=1`, is the plain method. If the
-    error has not been halved in 50 iterations, in later phases in 10, the next phase begins from
-    the same start. Later phases first turn effectors the long way round (a rotation has two
-    quaternions), and use the null space to stay near mid-range (Liegeois 1977). Each has a damping
-    of its own (Chan & Lawrence 1988), down to 0.001 of the squared error. In the end the best phase
-    goes on. Mid-range draws phases together: two phases from different starts often end in the same
-    pose.
-
+    On limited joints Levenberg-Marquardt is a fixed portfolio of phases without random numbers.
     More restarts never give a worse answer: a reached target stays reached, and the merit of a
-    missed target can only fall. Nor is the merit greater than after a single attempt. For solvers
-    without phases this even holds for an attempt of (1 + restarts) `max_iterations`, which the
-    first attempt makes in the end. With several effectors each restart of Levenberg-Marquardt
-    redraws only the limbs whose effectors fail, and every other time also the joints that limbs
-    share. Otherwise, if no attempt reaches the target, the attempts that were given up early are
-    finished. All attempts together make up to (1 + 2 restarts) `max_iterations`, for one position
-    on a Skeleton (2 + 3 restarts). Attempts at a target proven out of reach end at the least
-    distance that geometry allows, or where no small motion comes nearer. Two or three restarts then
-    mostly find the nearest pose.
-
-    A failed solve on joints is also UNREACHABLE where limits or a hole inside the reach keep the
-    effector from the target's distance. With a rotation the same goes for a point on the effector's
-    last axis. An effector's first failure computes the least and greatest distance, in 5 to 100 ms.
-    `certify_ik` has further proofs, which search for each target; a failed solve without a proof is
-    STALLED.
+    missed target can only fall. A failed solve is UNREACHABLE only where geometry, limits included,
+    proves the target out of reach. docs/inverse_kinematics.md explains all three.
 
     Args:
         skeleton: the tree; an Articulation for joints of other kinds and for limits, or a Robot

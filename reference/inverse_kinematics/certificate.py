@@ -1,30 +1,16 @@
 """Proofs about a pose q: its distance from the target, and an exact solution nearby or nowhere.
 
-**Reached.** With u = 2^-53 a joint's local rotation is known to 48 u. Half an angle's sine and
-cosine contribute 16 u, three quaternions made unit and two products with them 20 u. The sum and the
-product with the parent's quaternion contribute 11 u. Behind j joints the quaternion is off by e_j =
-48 u j, and a rotated vector of length l by (6 e_j + 48 u) l. With 82 u for the offset and its sum,
-joint j adds l_j (6 e_j + 130 u) on a path with link lengths l_j, slides included. The position x
-adds 2 u |x|; the sum is about 1e-13 m for an arm. Arguments of mimic joints add their own rounding.
+F holds distances over the reach and, for a target rotation, twice the vector part of the quaternion
+from target to effector. Newton's method polishes q to p within the limits. Let J be the Jacobian of
+F for the joints off their limits, B an approximate right inverse, and L a Lipschitz constant of J.
+With a = 1 - |I - J B| > 0 (Kantorovich 1948)
 
-**An exact solution.** F holds distances over the reach and, for a target rotation, twice the vector
-part of the quaternion from target to effector. Newton's method polishes q to p within the limits.
-Joints that come to their limits stay there, as do balls with limits, whose limits hold only to
-rounding. Let J be the Jacobian of F for the free joints, B an approximate right inverse, and L a
-Lipschitz constant of J. With a = 1 - |I - J B| > 0,
+    2 L |B|² |F(p)| < a²  =>  F(p + B z) = 0 for some |z| <= r,
+    r = 2 |F(p)| / (a + sqrt(a² - 2 L |B|² |F(p)|)).
 
-    2 L |B|² |F(p)| < a²  =>  F(p + B z) = 0 for some |z| <= r = 2 |F(p)| / (a + sqrt(a² - ...))
-
-(Kantorovich 1948). Proof: M(z) = z - F(p + B z) has |M'(z)| <= 1 - a + L |B|² |z|. So |M(z)| <=
-|F(p)| + (1 - a) |z| + L |B|² |z|² / 2 <= r in the ball of radius r: M maps the ball into itself
-(Brouwer). Joint i moves by at most |B_i| r, which must stay within its limits.
-
-L follows from lever arms. The second derivative of the position by two rotations is at most the
-distance of the lower joint from the effector. For a rotation and a slide below, the bound is 1; for
-two slides 0. The bound for twice a quaternion is 1/2. A ball counts as three rotations: in Q exp(v)
-the first and second derivatives are bounded in the same way. L is the Frobenius norm of the bounds.
-
-**Impossible.** See `reach`.
+Joint i moves by at most |B_i| r, which must stay within its limits. docs/certificates.md has the
+proof, the constant L, and the rounding errors of forward kinematics. A pose that no configuration
+reaches is proven by `reach`.
 """
 
 import math
@@ -55,7 +41,7 @@ from .problem import (
 from .reach import UNIT, least_distance
 from .solve import balls, solve_checked
 
-# Roundings of UNIT by a joint: of its quaternion, and of its offset, as derived above.
+# Roundings of UNIT by a joint: of its quaternion, and of its offset; see docs/certificates.md.
 QUATERNION_ROUNDINGS, OFFSET_ROUNDINGS = 48, 130
 # Factor to cover the rounding errors of the bounds themselves.
 SLACK = 1.0 + 1e-8

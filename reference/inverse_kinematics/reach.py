@@ -1,23 +1,14 @@
 """Proven bounds of the distances that a chain of limited joints can give: shells of reach.
 
-Let P be a point fixed to the end of a chain, C a point fixed to its base, and r = |P - C|. For
-joint i let D_i bound the distance of C from its axis over all configurations, and d_i the distance
-of P. The chain is followed from either end, from each axis to the nearest point of the next. With
-the lengths replaced by 1 for a slide,
+Let P be a point fixed to the end of a chain, C a point fixed to its base, and r = |P - C|. In a box
+of coordinates of half-widths w, with g the gradient of r² in its middle,
 
-    |dr / dq_i| <= min(D_i, d_i),    |d²(r²) / dq_i dq_j| <= 2 D_min(i,j) d_max(i,j) = H_ij,
+    |r² - r²(middle)| <= |g| w + w H w / 2,    H_ij = 2 D_min(i,j) d_max(i,j).
 
-because r² depends on both q_i and q_j only through twice the product of two vectors of lengths D_i
-and d_j. In a box of coordinates of half-widths w, with g the gradient of r² in its middle,
-
-    |r² - r²(middle)| <= |g| w + w H w / 2.
-
-Boxes are halved until a bound is within 1e-3 of the length of the chain, or a fixed number of boxes
-is used up. The bound holds in either case. Mimic joints count as independent joints.
-
-Rounding: with n joints and u = 2^-53 the forward kinematics of a chain of length S has an error of
-at most (289 n + 131) u S. The error of an axis is (288 n + 64) u (see `certificate`). Hence r² and
-g w are known to 3000 (n + 1) u S² (1 + sum of w).
+D_i bounds the distance of C from the axis of joint i over all configurations, and d_i the distance
+of P; the lengths of a slide are 1. Boxes are halved until a bound is accurate, or a fixed number of
+boxes is used up. Mimic joints count as independent joints. docs/certificates.md has the proof, with
+the rounding errors.
 """
 
 import math
@@ -33,7 +24,7 @@ from ..quaternion import add, rotate
 from ..skeleton import Skeleton
 
 UNIT = 2.0**-53  # the largest relative error of a rounding
-ROUNDINGS = 3000  # of UNIT by a joint, as derived above
+ROUNDINGS = 3000  # of UNIT by a joint; see docs/certificates.md
 # The accuracy of a shell, over the length of the chain, and the boxes for a shell and for a target.
 # All are limits of time: a bound with fewer boxes is wider, and as valid.
 ACCURACY, SHELL_BOXES, TARGET_BOXES = 1e-3, 20_000, 2_000
