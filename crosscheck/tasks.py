@@ -109,7 +109,7 @@ def centre_of_mass(engine: str, case: int) -> Comparison:
 
 
 def postures(engine: str, case: int) -> Comparison:
-    """Compare the velocity from a posture."""
+    """Compare the residual of a posture, the displacement from the posture, with the engine's."""
     robot, adapter, rows = _sample(engine, case)
     posture = robot.articulation.random(samples.generator("posture", case))
 

@@ -772,7 +772,7 @@ def _setting_for(error: float, row: ClothRow) -> str | None:
 
 
 def _largest(name: str, row: ClothRow) -> float | None:
-    """Return the largest of a number of the settings."""
+    """Return the largest value of an attribute among the points of a row; None without points."""
     return max((getattr(point, name) for point in row.points), default=None)
 
 

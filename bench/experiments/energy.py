@@ -55,7 +55,7 @@ def blocks(scale: Scale) -> Iterator[Block]:
 
 
 def swing(name: str, integrator: str, steps: int = STEPS) -> Measured:
-    """Let the cloth swing; keep its energy above rest, relative to the start."""
+    """Return times [s] of a swing, and the energy above rest over the energy at the start."""
     from plumbob.crosscheck.mass_spring.integrators import SIMULATORS, energy_series, implicit
 
     system, start, rest = long_swing(name)

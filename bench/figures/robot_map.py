@@ -67,7 +67,7 @@ class RobotMap(NamedTuple):
 
 
 def robot_maps(results: Results, *starts: str) -> list[RobotMap]:
-    """Return a map of each start and quantity, as far as there are solvers."""
+    """Return a map for each start with solvers and each quantity, solved targets and time."""
     return [
         _map(start, quantity, fields, results)
         for start in starts or STARTS

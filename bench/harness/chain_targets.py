@@ -39,7 +39,7 @@ class SolverLimits(NamedTuple):
 
 
 class ChainJob(NamedTuple):
-    """Targets and a solver: the answers to all targets, and the timed job."""
+    """The work of a solver: to answer all targets, and to be timed on the first."""
 
     answers: Callable[[], Measured]
     job: Job

@@ -75,7 +75,7 @@ Message = Started | Ready | Progress | Solved | Finished
 
 @dataclass(frozen=True)
 class JobOutcome(Ready, Finished):
-    """The messages of a job together; without other trouble, the most frequent exception."""
+    """The messages of a job in one value; its trouble is, by default, the commonest exception."""
 
     solved: list[Solved] = field(default_factory=list)  # in the order of the targets
 
@@ -228,7 +228,7 @@ def in_a_fresh_process(patience: float, function: Calculate, *arguments: Any) ->
 
 
 def believed(solved: Sequence[Solved]) -> list[Solved]:
-    """Return answers whose times are all round trips if the solver's clock is ever doubted."""
+    """Return the answers, all timed by round trips if any time by the solver is in doubt."""
     if not any(answer.time.doubt for answer in solved):
         return [*solved]
     return [a._replace(time=a.time._replace(seconds=a.duration)) for a in solved]

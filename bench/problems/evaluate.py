@@ -33,7 +33,7 @@ class Tolerance(NamedTuple):
 
 
 class PoseRequest(NamedTuple):
-    """A target."""
+    """A target pose of each effector, and the configuration to start from."""
 
     positions: FloatArray  # of the effectors [m], (effector, 3)
     rotations: FloatArray  # of the effectors, (effector, 3, 3)

@@ -44,7 +44,7 @@ class UnableError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class BenchRobot:
-    """A robot or character, as text for any reader."""
+    """A robot or character as the text of a model file, which every peer reads in its own way."""
 
     name: str  # of the robot
     title: str  # how it is written

@@ -312,7 +312,7 @@ def by_robot(records: Iterable[Record], start: str = "") -> dict[str, list[Score
 
 
 def on_targets_of(solver: str, field: list[Score]) -> list[Score]:
-    """Return the solvers of a robot on the first targets if a slow solver got these only."""
+    """Return the scores on the targets of a solver: the first few, if a slow solver got no more."""
     records = [score.records[0] for score in field]
     own = next((r for r in records if r.solver == solver and FIRST_TARGETS in r.measured), None)
     if own is None:

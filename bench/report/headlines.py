@@ -269,7 +269,7 @@ def _fastest(rows: dict[str, Score], times: Sequence[str], best: str) -> str:
 
 
 def _in_order(a: str, b: str, ratio: metrics.Interval) -> tuple[str, str, metrics.Interval]:
-    """Return two solvers, the faster first, with the ratio of the other's time to its."""
+    """Return the faster of two solvers, the slower, and the ratio of their times, above 1."""
     if ratio.value >= 1.0:
         return a, b, ratio
     return b, a, metrics.Interval(1.0 / ratio.value, 1.0 / ratio.high, 1.0 / ratio.low)

@@ -61,7 +61,7 @@ class Layout:
     def __call__(self, results: Results) -> Table:
         """Return the table with a row for each subject, the best of each group first.
 
-        Our own loops on other engines are shown, and never best.
+        Rows of our own loops on other engines are shown, and never marked best.
         """
         return results.cached(self._table)
 
@@ -123,7 +123,7 @@ def source(subject: Any) -> Source:
 
 
 def records_of(subject: Any) -> Iterator[Record]:
-    """Yield the records in a subject; only its attribute `record` or `records` if present."""
+    """Yield the records of a row's subject, from its attribute `record` or `records` if any."""
     if isinstance(subject, Record):
         yield subject
     elif isinstance(getattr(subject, "record", None), Record):

@@ -20,7 +20,7 @@ def _why_not_asked(record: Record) -> str:
 
 
 def solver_remarks(results: Results, suites: Iterable[str]) -> list[str]:
-    """Return a sentence on each user's solver of some suites not asked for every task."""
+    """Return a sentence on each user's solver that a task of the suites leaves out, with reason."""
     records = [record for suite in suites for record in results.all(suite, entrant=True)]
     remarks = (f"{r.solver} was {why}." for r in records if (why := _why_not_asked(r)))
     return list(dict.fromkeys(remarks))

@@ -29,7 +29,7 @@ SHOWS = (
 
 
 class FileGroup(NamedTuple):
-    """The readings of all files of a kind by an engine."""
+    """How an engine read all files of a format."""
 
     kind: str
     engine: str
@@ -37,7 +37,7 @@ class FileGroup(NamedTuple):
 
 
 def lines_on(checked: CheckedFile) -> list[str]:
-    """Return a line on the readings of a file and lines on their reasons; none for a fragment."""
+    """Return a line on how engines read a file, and lines on disagreements; none for a fragment."""
     if checked.file.kind == FRAGMENT:
         return []
     outcomes = "; ".join(f"{reading.engine} {_outcome(reading)}" for reading in checked.readings)

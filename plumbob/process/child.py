@@ -88,7 +88,7 @@ def take_line(received: bytearray) -> tuple[bytes, ...]:
 
 
 def take_pickle(received: bytearray) -> tuple[Any, ...]:
-    """Remove the first object, as sent by `multiprocessing.connection.Connection`."""
+    """Remove and return the first complete object, () if none; see `multiprocessing.connection`."""
     if len(received) < 4:
         return ()
     size: int = struct.unpack_from("!i", received)[0]

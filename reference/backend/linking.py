@@ -57,7 +57,7 @@ class LinkedLibrary(JITCodeLibrary):
         return self
 
     def set_env(self, name: str, environment: Any) -> None:
-        """Do nothing, as no environment is read without machine code."""
+        """Ignore numba's environment, which only machine code of this library would read."""
 
 
 class KernelLibrary(JITCodeLibrary):

@@ -430,7 +430,7 @@ def _rotated(
 
 
 def _framed(name: str, values: FloatArray, axes: int) -> FloatArray:
-    """Return an array with frames as its leading axis, which is added to a single pose."""
+    """Return values with a leading axis of frames: a single pose becomes a motion of one frame."""
     if values.ndim not in (axes - 1, axes):
         raise ValueError(f"{name}: expected one pose or a row of frames, got {values.shape}")
     return values if values.ndim == axes else values[None]

@@ -17,7 +17,7 @@ DEPTH = 5
 
 
 class Mixing(NamedTuple):
-    """The last sweeps, over the numbers x that they change; empty without acceleration."""
+    """The numbers x before and after recent sweeps, to extrapolate; empty without acceleration."""
 
     sweep_count: FloatArray  # of the sweeps since all were forgotten, (1,)
     start: FloatArray  # x before the last sweep

@@ -219,7 +219,7 @@ def forward_free(mechanism, target, data, work, j):
 
 
 def forward_rotation(mechanism, target, data, work, j):
-    """Return the best rotation of joint j for adjacent points, the shortest for a single point."""
+    """Return the rotation of joint j that fits adjacent points best; the shortest for one point."""
     backward, joints = work.backward, len(mechanism.joints)
     count, arm, to = 0, ZERO, ZERO
     for e in range(len(mechanism.effectors)):

@@ -134,7 +134,7 @@ def _attached(
     oriented: tuple[bool, ...],
     number: dict[int, int],
 ) -> RecordArray:
-    """Return the effectors, each with the moving joint that carries it and its place there."""
+    """Return the effectors, each with the moving joint that carries it and its pose there."""
     ends = np.zeros(len(effectors), EFFECTOR)
     ends["source"], ends["oriented"] = effectors, oriented
     sizes = np.where(oriented, 6, 3)

@@ -152,10 +152,11 @@ def push_components(graph, search, region, piece, first, pieces, waiting):
 
 
 def measure(graph, search, region, piece):
-    """Give the vertices of a connected piece their coordinates; return the region of the vertices.
+    """Fill four coordinates of each vertex of a connected piece; return the piece's region.
 
-    Two pairs of far vertices, a and b, c and d, give the differences of distances, their sum and
-    their difference. On a grid these are the directions along its sides and its diagonals.
+    For two pairs of far vertices, a and b, c and d, f is the distance from a less the distance from
+    b, and g the same for c and d. The coordinates are f, g, f + g and f - g. On a grid they run
+    along its sides and its diagonals.
     """
     axes = search.axes
     for axis in range(AXES):

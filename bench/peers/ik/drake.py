@@ -54,11 +54,17 @@ def prepare(
     inside: float = 0.5,
     centring: float = 0.0,
 ) -> SolveFactory:
-    """Return the program, set up for a robot.
+    """Return the nonlinear program of a pose, set up for a robot.
 
-    `feasibility` is the solver's tolerance on constraints, `inside` the requested part of the
-    bench's tolerance. `centring` is the weight of the squared distance from the middle of the
-    limits, which is then the objective.
+    Args:
+        robot: a chain of hinges.
+        tolerance: the bench's.
+        solver: the name of the optimiser.
+        iterations: at most.
+        feasibility: tolerance of the optimiser on constraints.
+        inside: the constraints allow this share of the bench's tolerance.
+        centring: weight of the objective, the squared distance from the middle of the limits;
+            0 for no objective.
     """
     from pydrake import solvers
     from pydrake.math import RigidTransform, RotationMatrix

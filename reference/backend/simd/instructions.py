@@ -86,7 +86,7 @@ for _operation, _instruction in INSTRUCTIONS.items():
 
 @type_callable(operator.neg)
 def negated(context):
-    """Let lanes be negated."""
+    """Return the typing of -a for a vector of lanes; None for other types."""
     return lambda a: lanes if a is lanes else None
 
 
