@@ -62,6 +62,7 @@ def test_progress_is_announced():
     assert sum("round" in message for message in messages) == 2 * (suite.ROUNDS[1] + 1)
 
 
+@pytest.mark.slow
 def test_a_failure_in_its_process_is_reported():
     with pytest.raises(RuntimeError, match="ValueError: library"):
         suite.in_its_own_process(SMALL, "json")

@@ -116,7 +116,7 @@ OTHERS = {
 
 @pytest.mark.parametrize(
     "name",
-    [pytest.param(one, marks=[] if one in ("nobody", "zeros") else pytest.mark.slow)
+    [pytest.param(one, marks=[] if one == "zeros" else pytest.mark.slow)
      for one in OTHERS],
 )  # fmt: skip
 def test_another_server_at_the_address_is_misuse(name):

@@ -135,7 +135,7 @@ def opened(folder, way, row):
     return open_contestant(spec, limits)
 
 
-PYTHON_QUICK = ("replaces the clock", "exits", "changes its inputs", "floods its output")
+PYTHON_QUICK = ("replaces the clock", "floods its output")
 
 
 def check_sentence(folder, way, name):
@@ -158,6 +158,7 @@ def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
     check_sentence(tmp_path, "python", name)
 
 
+@pytest.mark.sample(every=4)
 @pytest.mark.parametrize("name", rows("program"))
 def test_a_hostile_program_gets_its_sentence(tmp_path, name):
     check_sentence(tmp_path, "program", name)

@@ -111,6 +111,7 @@ def evaluation(targets, answers):
     return evaluator_of("iiwa14").evaluate(targets, q, TOLERANCE)
 
 
+@pytest.mark.sample("prints")
 @pytest.mark.parametrize("manner", ["perfect", "prints"])
 def test_a_perfect_solver_is_perfect_in_its_own_process_whatever_it_prints(worker, targets, manner):
     outcome = worker.perform(job(targets, manner))

@@ -176,6 +176,7 @@ def look_into_everything(folder):
             assert len({len(row) for row in csv.reader(text.splitlines())}) <= 1
 
 
+@pytest.mark.sample("solver-problem")
 @pytest.mark.parametrize(
     "fields", [("solver", "problem"), ("settings", "stamp", "measured")], ids="-".join
 )

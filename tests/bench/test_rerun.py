@@ -20,7 +20,6 @@ from plumbob.bench.comparison import rerun as rerunning
 from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
 from plumbob.bench.comparison.rows import ChangeVerdict, Pair, TimeRatio, row_key
 from plumbob.bench.comparison.times import time_change
-from plumbob.bench.harness import machine
 from plumbob.cli import main as cli
 
 KEY = ("timing", "p", "mine", "{}")
@@ -182,12 +181,6 @@ def test_a_revision_beside_itself_answers_alike_and_one_pair_tells_no_drift(repo
     assert worktrees(repository) == 1
 
 
-@pytest.mark.slow
-def test_a_revision_beside_itself_is_neither_faster_nor_slower(repository):
-    made = [side_by_side(repository, seed) for seed in range(20)]
-    assert sum(bool(called(one)) for one in made) <= 1
-
-
 def test_a_planted_digit_is_first_of_all(repository):
     write(repository, loops=2 * LOOPS, digit=np.nextafter(0.5, 1.0))
     made = side_by_side(repository, pairs=2)
@@ -256,15 +249,6 @@ def test_ratios_within_a_hundredth_count_as_chance():
     pairs = {(KEY, str(r)): [(1.0, r)] * 30 for r in (0.985, 0.992, 1.0, 1.008, 1.015)}
     chances = [ratio.chance < 1e-6 for ratio in rerunning._ratios(pairs).values()]
     assert chances == [True, False, False, False, True]
-
-
-@pytest.mark.slow
-def test_a_planted_fifth_is_found(repository):
-    write(repository, loops=LOOPS * 6 // 5)
-    made = side_by_side(repository, pairs=14)
-    assert called(made) == {("ours", "seconds"): ChangeVerdict.SLOWER}
-    ratio = next(row.ratio for row in made.rows if row.key[2] == "ours" and row.ratio)
-    assert ratio.low < 1.2 < 1.1 * ratio.high
 
 
 def test_what_cannot_be_measured_is_said_and_nothing_is_left(repository):
@@ -419,15 +403,6 @@ def test_a_solver_of_another_project_is_measured_at_both_revisions(capsys, tmp_p
     (package / "new.py").write_text(ARM)
     assert cli.run_command([*gate, "--with", "armkit.new:Arm"]) == 2
     assert "--rerun: HEAD cannot be measured: with: expected a solver" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_this_revision_beside_itself_differs_in_nothing():
-    """The real bench, its working copy beside its last commit, on two rows of timing."""
-    root = Path(machine.__file__).resolve().parents[2]
-    made = rerun(Plan("HEAD", ("timing",), ("10 balls/one pose",)), root)
-    assert len(made.rows) >= 4
-    assert called(made) == {}
 
 
 @pytest.mark.parametrize("own", [True, False])
