@@ -74,30 +74,6 @@ def test_misuse_exits_2_with_one_sentence(capsys, main_job, empty_folder, argume
     assert not (empty_folder / "report" / "records.jsonl").exists()
 
 
-@pytest.mark.parametrize(
-    "arguments", [[], ["bench", "arm"], ["report"], ["show", "heart"]], ids=lambda a: " ".join(a)
-)
-def test_a_folder_that_cannot_be_written_to_exits_2_and_is_named(capsys, empty_folder, arguments):
-    (empty_folder / "file").write_text("in the way")
-    folder = empty_folder / "file" / "report"
-    target = ["-o", str(folder / "a.html") if "show" in arguments else str(folder)]
-    code, _, err = plumbob(capsys, *arguments, *target)
-    assert code == 2
-    assert str(empty_folder / "file") in err
-    assert err.count("\n") == 1
-
-
-@pytest.mark.parametrize("arguments", [["bench", "arm"], ["report"], ["bench", "--fresh"]])
-def test_a_corrupt_result_file_exits_2_and_stays(capsys, empty_folder, arguments):
-    path = RecordFile(empty_folder / "report").path
-    path.parent.mkdir()
-    path.write_text("no record\n")
-    code, _, err = plumbob(capsys, *arguments)
-    assert code == 2
-    assert "line 1: not a record" in err
-    assert path.read_text() == "no record\n"
-
-
 def a_record(solver="ccd", **more):
     """A record that a report can be made of."""
     facts = {"subject": "kinematics", "group": "x", "work": "one pose a call"}
@@ -324,32 +300,6 @@ def test_files_are_checked_and_counted(capsys, robots):
     )
     assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
     assert re.search(r"^MJCF +Pinocchio +2 +1 +0 +1 ", out, re.MULTILINE)
-
-
-def test_a_file_is_printed_before_the_next_is_read(capsys, robots, monkeypatch):
-    from plumbob.crosscheck.robots import files
-
-    read, printed = files.check, []
-
-    def check(selection):
-        for reading in read(selection):
-            yield reading
-            printed.append(capsys.readouterr().out)
-
-    monkeypatch.setattr(files, "check", check)
-    assert plumbob(capsys, "check", "--files", "robots")[0] == 0
-    names = ("robots/arms/arm|1.urdf ", "robots/b.xml ", "robots/c.xml ")
-    assert [text.startswith(name) for name, text in zip(names, printed, strict=False)] == [True] * 3
-
-
-def test_files_that_nobody_reads_are_counted_and_names_are_no_markup(capsys, robots):
-    (robots / "broken.urdf").write_text("<robot")
-    (robots / "[red]b.xml").write_text(CHARACTER(BODY("")))
-    code, out, _ = plumbob(capsys, "check", "--files", "robots")
-    assert code == 0
-    assert "Of 5 files nothing disagrees, 1 is read by none; 1 is a part" in out
-    assert "robots/[red]b.xml" in out
-    assert "|" not in out.replace("arm|1", "")
 
 
 def test_files_that_differ_exit_1(capsys, robots):

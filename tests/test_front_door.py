@@ -36,13 +36,6 @@ def test_every_public_name_of_the_reference_is_at_the_front_door():
     assert plumbob.__version__ == importlib.metadata.version("plumbob")
 
 
-def test_the_module_runs_the_command_line(tmp_path):
-    command = [sys.executable, "-m", "plumbob", "--version"]
-    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    run = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True)
-    assert run.stdout == f"plumbob {plumbob.__version__}\n"
-
-
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_example_runs_and_says_what_it_should(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)

@@ -146,32 +146,3 @@ def test_a_python_without_wheels_is_said_and_fails(pythons, stand_in, monkeypatc
     assert capsys.readouterr().out.count("\n") == sum(map(len, pythons.LOCKS.values()))
     monkeypatch.setenv("UV", str(stand_in("uv", "")))
     assert pythons.main("wheels") == 0
-
-
-def test_only_wheels_are_asked_for_and_hashes_are_checked(pythons, stand_in, monkeypatch):
-    asks = "sys.exit(' '.join(sys.argv[1:]))"
-    monkeypatch.setenv("UV", str(stand_in("uv", asks)))
-    (asked,) = pythons.without_wheels(LOCKS[0], ["3.14"], ["arm"])
-    assert "--python-version 3.14 --python-platform arm" in asked
-    assert "--only-binary :all: --require-hashes" in asked
-
-
-def test_pythons_are_found_by_what_they_say_they_are(pythons, stand_in, monkeypatch, tmp_path):
-    for folder, says in (("3.12.7", "3.12"), ("3.13.1", "3.9"), ("3.14.0", "")):
-        stand_in(f"versions/{folder}/bin/python", f"print({says!r})")
-    monkeypatch.setenv("PYENV_ROOT", str(tmp_path))
-    monkeypatch.setenv("PATH", str(tmp_path))
-    assert dict(pythons.installed()) == {"3.12": tmp_path / "versions/3.12.7/bin/python"}
-
-
-@pytest.mark.parametrize("failing", ["venv", "-r", "-e", "pytest", None])
-def test_a_step_that_fails_is_a_failure(pythons, stand_in, monkeypatch, tmp_path, failing):
-    """The stand-in's environments hold the stand-in itself."""
-    python = stand_in("x/bin/python", f"sys.exit({failing!r} in sys.argv)")
-    monkeypatch.setattr(pythons, "VENVS", tmp_path)
-    assert pythons.test("x", python, LOCKS[0], ["-q"]) == (failing is None)
-
-
-def test_the_lowest_versions_are_tested_in_the_workflow():
-    workflow = (ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8")
-    assert "make test-lowest" in workflow

@@ -7,12 +7,9 @@ from plumbob.crosscheck import samples
 from plumbob.crosscheck.engines import (
     SKELETON_ENGINES,
     MujocoFlex,
-    MujocoJointChain,
     MujocoMassSpring,
     forward_kinematics_by,
-    mujoco_mass_spring,
 )
-from plumbob.crosscheck.engines.mujoco_mass_spring import add_point_mass
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.crosscheck.tolerances import TOLERANCES
 from plumbob.reference.implicit_euler import ImplicitEuler
@@ -83,13 +80,6 @@ def test_pins_hold_and_move_with_the_state():
     assert np.allclose(at_home, engine.spring_forces(), rtol=1e-9)
 
 
-def test_spring_of_no_length_pushes_along_x():
-    system = MassSpring([1.0, 1.0], [[0, 1]], 0.5, 100.0)
-    engine = MujocoMassSpring(system)
-    engine.update_forces(State(np.ones((2, 3)), np.zeros((2, 3))))
-    assert np.array_equal(engine.spring_forces(), [[50.0, 0.0, 0.0], [-50.0, 0.0, 0.0]])
-
-
 def test_motion_that_blows_up_is_not_started_afresh(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes a log of its warnings where it stands
     system = MassSpring([1.0, 1.0], [[0, 1]], 0.5, 1e12)
@@ -121,42 +111,6 @@ def test_discrete_sees_no_stiffness_at_the_very_rest_length(shift, stiff):
     engine = MujocoMassSpring(system, h=0.1, integrator="discrete")
     end = engine.step(State([[0, 0, 0], [1.0 + shift, 0, 0]], [[0, 0, 0], [1.0, 0, 0]]))
     assert end.velocities[1, 0] == pytest.approx(1 / 11 if stiff else 1.0)
-
-
-def test_integrators_and_joints_must_be_known():
-    known = "Euler, RK4, implicit, implicitfast, discrete"
-    with pytest.raises(ValueError, match=f"integrator: expected one of {known}, got 'RK5'"):
-        MujocoMassSpring(samples.network(0).system, integrator="RK5")
-    with pytest.raises(ValueError, match="joint: expected one of slide, hinge, got 'ball'"):
-        MujocoJointChain(samples.line(0).system, h=0.01, joint="ball")
-
-
-def off_centre(*arguments):
-    body = add_point_mass(*arguments)
-    body.ipos = np.array([0.1, 0.2, 0.3])
-    return body
-
-
-@pytest.mark.parametrize("simple", [True, False])
-def test_implicitfast_keeps_whole_blocks_only_where_the_mass_matrix_does(monkeypatch, simple):
-    system, state, external, h = samples.network(4)
-    if not simple:
-        monkeypatch.setattr(mujoco_mass_spring, "add_point_mass", off_centre)
-    fast, whole = (
-        MujocoMassSpring(system, h=h, integrator=integrator)
-        for integrator in ("implicitfast", "implicit")
-    )
-    assert (fast.model.body_simple[fast.bodies[fast.free]] > 0).all() == simple
-    apart = fast.step(state, external).velocities - whole.step(state, external).velocities
-    assert (np.abs(apart).max() < 1e-14) != simple
-
-
-@pytest.mark.parametrize("name", ["stiffnesses", "dampings"])
-def test_flex_wants_springs_alike(name):
-    properties = {"stiffnesses": 1.0, "dampings": 1.0} | {name: [1.0, 2.0]}
-    system = MassSpring(np.ones(3), [[0, 1], [1, 2]], 1.0, **properties)
-    with pytest.raises(ValueError, match=f"{name}: expected the same for all springs"):
-        MujocoFlex(system)
 
 
 def test_flex_stores_no_energy_between_two_pins():

@@ -6,13 +6,12 @@ import signal
 import time
 import tracemalloc
 from contextlib import closing
-from functools import partial
 
 import numpy as np
 import pytest
 
 from plumbob.crosscheck.engines.file_kind import BVH, FRAGMENT, MJCF, URDF, file_kind
-from plumbob.crosscheck.robots import comparisons, files, independent_bvh
+from plumbob.crosscheck.robots import comparisons, files
 from plumbob.crosscheck.robots.comparisons import sweep_in_parts
 from plumbob.crosscheck.robots.deviations import FRAME, INCLUDE, PLANE, QUATERNION
 from plumbob.crosscheck.robots.files import (
@@ -115,11 +114,6 @@ KINDS = {
 }
 
 
-def test_the_kind_of_a_file_in_utf_16_is_that_of_its_text(tmp_path):
-    (tmp_path / "a.xml").write_bytes(character(TRUNK).encode("utf-16"))
-    assert file_kind(tmp_path / "a.xml") == MJCF
-
-
 @pytest.mark.parametrize("name", KINDS)
 def test_the_kind_of_a_file_follows_from_its_name_and_root_element(name, tmp_path):
     (tmp_path / name).write_text(KINDS[name][0])
@@ -214,13 +208,6 @@ def test_includes_are_read_from_the_whole_folder(folder, here):
     reading = outcomes(root / "robots")["a.xml"]["MuJoCo"]
     assert reading.outcome == REFUSED
     assert "which is outside" in reading.why
-
-
-def test_shapes_in_files_that_are_not_there_do_not_matter(folder, here):
-    mesh = '<mujoco><asset><mesh name="m" file="m.stl"/></asset><worldbody>{}</worldbody></mujoco>'
-    shape = '<geom type="mesh" mesh="m"/>'
-    root = folder(a_xml=mesh.format(TRUNK.replace("<joint", f"{shape}<joint")))
-    assert outcomes(root)["a.xml"]["MuJoCo"].outcome == AGREES
 
 
 def test_a_difference_is_excused_only_where_the_other_engine_agrees(folder, here, monkeypatch):
@@ -421,13 +408,6 @@ def test_channels_in_small_letters_are_the_same_channels(tmp_path):
     assert (reading.outcome, reading.why) == (AGREES, "")
 
 
-def test_white_space_before_the_declaration_keeps_no_engine_from_reading(folder, here):
-    root = folder(a_urdf='\n<?xml version="1.0"?>' + ARM(-1))
-    for reading in outcomes(root)["a.urdf"].values():
-        assert reading.outcome == AGREES
-        assert "white space before" in reading.notes[0]
-
-
 def raising(*_):
     raise KeyError("a")
 
@@ -445,14 +425,6 @@ def test_a_difference_above_the_tolerance_differs_and_an_exception_is_lost(
     monkeypatch.setattr(files, "_largest_difference", largest)
     reading = compare("MuJoCo", find([folder(a_urdf=ARM(-1))]).files[0])
     assert (reading.outcome, reading.why) == (outcome, why)
-
-
-def test_a_joint_that_the_second_reader_misses_differs(folder, monkeypatch):
-    file = find([folder(a_bvh=motion())]).files[0]
-    monkeypatch.setattr(
-        files, "global_poses", lambda text: list(independent_bvh.global_poses(text))[:-2]
-    )
-    assert compare(SECOND_READER, file).outcome == DIFFERS
 
 
 @pytest.mark.slow
@@ -484,16 +456,6 @@ def spin(seconds):
         pass
 
 
-class SlowToReceive:
-    """An argument that takes so much processor time [s] to be unpickled."""
-
-    def __init__(self, seconds):
-        self.seconds = seconds
-
-    def __reduce__(self):
-        return spin, (self.seconds,)
-
-
 def loud():
     os.write(1, b"loud")
     os.write(2, b"loud")
@@ -517,37 +479,3 @@ def test_a_call_that_crashes_or_hangs_is_lost_and_the_next_one_is_not(capfd):
         process = child._child._process
     assert process.returncode is not None
     assert capfd.readouterr() == ("", "")
-
-
-@pytest.mark.slow
-def test_a_call_that_waits_for_the_processor_is_not_lost():
-    """Only its own processor time counts: no waiting, no start, nothing between two calls."""
-    with closing(CallProcess(partial(spin, 1.0), patience=0.5)) as child:
-        process = child.call(os.getpid)
-        for _ in range(2):
-            child.call(time.sleep, 0.7)
-            child.call(spin, 0.3)
-            child.call(str, SlowToReceive(0.3))
-        assert child.call(os.getpid) == process
-
-
-def test_both_readers_of_motions_agree_on_several_end_sites_of_a_joint(folder, here):
-    ends = "End Site { OFFSET 0 1 0 } End Site { OFFSET 1 0 0 } End Site"
-    text = motion().replace("joint1", "joint3 end").replace("End Site", ends)
-    reading = outcomes(folder(a_bvh=text))["a.bvh"][SECOND_READER]
-    assert (reading.outcome, reading.why) == (AGREES, "")
-
-
-def test_the_second_reader_reads_what_the_first_wrote(rng):
-    skeleton = Skeleton([-1, 0, 1, 0], rng.uniform(-1, 1, (4, 3)), ["a", "b c", "b c end", "d"])
-    local = rotation.random(rng, 5, 4)
-    local[:, 2] = [1, 0, 0, 0]
-    text = bvh.format(skeleton, local)
-    pose = bvh.parse(text).pose()
-    found = {name: (x, R) for name, x, R in independent_bvh.global_poses(text.lower().upper())}
-    assert set(found) >= {"A", "B C", "D"}
-    for name, j in (("A", 0), ("B C", 1), ("D", 3)):
-        np.testing.assert_allclose(found[name][0], pose.positions[:, j], atol=1e-14)
-        np.testing.assert_allclose(
-            found[name][1], rotation.to_matrix(pose.rotations[:, j]), atol=1e-14
-        )

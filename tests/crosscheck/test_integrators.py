@@ -20,12 +20,6 @@ def test_series_begins_with_the_energy_of_the_start_and_ends_in_time(motion):
     assert series.energies[2] == pytest.approx(mechanical_energy(system, last))
 
 
-def test_steps_must_come_out_even():
-    system, state, h = samples.oscillator(0)
-    with pytest.raises(ValueError, match="steps: expected a multiple of 3, got 7"):
-        energy_series(SIMULATORS["Runge-Kutta"], system, state, h, steps=7, every=3)
-
-
 def test_moved_pins_are_where_the_step_took_them():
     system, state, external, h = samples.network(0, damped=False)
     pins_at = state.positions[system.pinned] + 0.1

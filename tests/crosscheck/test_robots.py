@@ -37,7 +37,7 @@ from plumbob.crosscheck.robots.deviations import (
     SHARED_REF,
     known_deviations,
 )
-from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, IMMOBILE, ROBOTS, UNREAD, RobotFile
+from plumbob.crosscheck.robots.models import CAUSES, CHARACTERS, ROBOTS, UNREAD, RobotFile
 from plumbob.crosscheck.verdict import check_claim
 from plumbob.reference import Articulation
 from plumbob.reference.formats import mjcf, urdf
@@ -300,18 +300,6 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
 
 
 @pytest.mark.parametrize("engine", ROBOT_ENGINES)
-@pytest.mark.parametrize(
-    ("name", "text"), [("cut.urdf", URDF[:500]), ("cut.xml", MJCF[:500]), ("other.xml", "<html/>")]
-)
-def test_the_reason_of_a_refusal_is_one_line(engine, name, text, tmp_path):
-    (tmp_path / name).write_text(text)
-    with pytest.raises(UnreadableError) as error:
-        ROBOT_ENGINES[engine](tmp_path / name)
-    assert str(error.value)
-    assert "\n" not in str(error.value)
-
-
-@pytest.mark.parametrize("engine", ROBOT_ENGINES)
 def test_engines_keep_quiet_and_leave_no_log(engine, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     path = tmp_path / "warns.urdf"
@@ -384,16 +372,6 @@ def test_a_mimic_of_a_mimic_moves_and_is_in_the_jacobian(order, engine, tmp_path
     rates = (ahead - behind) / 2e-5
     theirs = swept.expected.jacobians[..., :3, :].sum(axis=-1)  # all coordinates change
     np.testing.assert_allclose(theirs, rates, atol=1e-8)
-
-
-@pytest.mark.parametrize("engine", ROBOT_ENGINES)
-def test_mimics_in_a_ring_are_left_free(engine, tmp_path):
-    text = chain_of_mimics(2, (0, 1))
-    ring = text.replace("</joint></robot>", '<mimic joint="j0"/></joint></robot>')
-    assert ring != text
-    swept = sweep(engine, written(tmp_path, ring, "a.urdf"))
-    assert swept.free_mimics
-    assert max(differences([swept])) < 1e-14
 
 
 CLASS_C = '<x><default><default class="c"/></default></x>'
@@ -482,14 +460,6 @@ def test_what_each_engine_does_not_read_or_reads_otherwise(engine):
     assert len(models.models(ROBOTS)) == 69
 
 
-@pytest.mark.slow
-def test_immobile_models_have_no_freedoms():
-    for model in models.models(ROBOTS):
-        if model.path.stem != "ur3":
-            immobile = not model.read(mimic=False).articulation.freedom_count
-            assert immobile == (model.name in IMMOBILE)
-
-
 @pytest.fixture
 def without(monkeypatch):
     """Pretend that some packages are not installed."""
@@ -504,14 +474,6 @@ def without(monkeypatch):
     models.models.cache_clear()
 
 
-def test_characters_are_checked_on_every_python(without):
-    without("dm_control")
-    names = {model.path.stem for model in models.models(CHARACTERS)}
-    assert {"humanoid", "ant", "half_cheetah"} <= names
-    for engine in ROBOT_ENGINES:
-        assert len(models.comparable(CHARACTERS, engine, moving=True)) == 8
-
-
 @pytest.mark.parametrize("packages", [("dm_control",), ("example-robot-data", "gymnasium")])
 def test_what_is_not_installed_is_said_in_a_line_and_claims_nothing(packages, without):
     absent = {p for of in models.PACKAGES.values() for p in of if models.folder(p) is None}
@@ -524,9 +486,3 @@ def test_what_is_not_installed_is_said_in_a_line_and_claims_nothing(packages, wi
     roots = [models.folder(p) for of in models.PACKAGES.values() for p in of]
     files = [model.path for family in models.PACKAGES for model in models.models(family)]
     assert all(any(path.is_relative_to(root) for root in roots if root) for path in files)
-
-
-def test_where_all_is_installed_nothing_is_said(monkeypatch, tmp_path):
-    assert models.folder("plumbob-nowhere") is None
-    monkeypatch.setattr(models, "folder", lambda package: tmp_path)
-    assert models.left_out() == ""

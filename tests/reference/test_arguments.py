@@ -46,14 +46,6 @@ def springs(name, given):
     return arguments.indices(name, given, "spring", 2, minimum=0, below=3)
 
 
-def test_lists_and_single_precision_become_contiguous_doubles():
-    for given in ([[1, 2], [3, 4]], np.float32([[1, 2], [3, 4]]), np.ones((2, 4))[:, ::2]):
-        result = arguments.array("a", given, 2, 2)
-        assert result.dtype == np.float64
-        assert result.flags.c_contiguous
-        assert result.flags.writeable
-
-
 REFUSED = [
     (row, np.ones((2, 3)), "expected shape (joint, 4), got (2, 3)"),
     (row, np.ones(4), "expected shape (joint, 4), got (4,)"),
@@ -122,15 +114,6 @@ def test_the_ends_of_a_range_belong_to_it():
 def test_of_several_sizes_the_wrong_one_is_named():
     with pytest.raises(ValueError, match="masses: expected none below 0, got -1e-80 at index 1"):
         arguments.sizes("masses", [1.0, -1e-80], "particle")
-
-
-def test_indices_are_copied_and_what_is_spread_or_read_only_comes_back_writable():
-    given = np.array([0, 1])
-    pins("i", given)[0] = 1
-    assert given.tolist() == [0, 1]
-    shown = arguments.frozen(np.zeros((1, 3)))
-    assert arguments.floats("a", shown, "...", 3).flags.writeable
-    assert arguments.spread(np.zeros((1, 3)), (2, 3)).flags.writeable
 
 
 ARM, REST = scenes.lab_arm()

@@ -1,6 +1,3 @@
-import copy
-from pickle import dumps, loads
-
 import numpy as np
 import pytest
 
@@ -114,12 +111,3 @@ def test_prepared_kinematics_of_an_articulation_have_the_same_bits(articulated, 
     for wrong, words in ((rows[0] * 1.01, "length 1.01"), (rows, "shape"), (infinite, "inf")):
         with pytest.raises(ValueError, match=f"^q: expected .*{words}"):
             forward(wrong)
-
-
-@pytest.mark.parametrize("duplicate", [copy.copy, copy.deepcopy, lambda f: loads(dumps(f))])
-def test_a_copy_of_prepared_kinematics_computes_into_arrays_of_its_own(skeleton, rng, duplicate):
-    forward, (first, second) = prepare(skeleton), rotation.random(rng, 2, skeleton.joint_count)
-    pose = forward(first)
-    other = duplicate(forward)(second)
-    np.testing.assert_array_equal(other.positions, forward_kinematics(skeleton, second).positions)
-    np.testing.assert_array_equal(pose.positions, forward_kinematics(skeleton, first).positions)

@@ -149,13 +149,6 @@ class TestClothFromMesh:
         assert pairs(system) >= {(2, 3), (2, 4), (3, 4)}
         assert len(system.springs) == 7 + 3
 
-    def test_an_edge_is_not_doubled_by_a_bending_spring(self):
-        """What faces each other across an edge of a tetrahedron is joined by an edge."""
-        x = np.vstack([np.zeros(3), np.eye(3)])
-        triangles = list(itertools.combinations(range(4), 3))
-        system, _ = scenes.cloth_from_mesh(x, triangles, density=1.0, bending_stiffness=1.0)
-        assert len(pairs(system)) == 6
-
     @pytest.mark.parametrize(
         ("change", "message"),
         [

@@ -241,15 +241,12 @@ CALLER = textwrap.dedent("""
     import numpy as np
     from callee{number} import callee
     from plumbob.reference.backend.compiled import Kernel
-    from plumbob.reference.backend.simd.vectors import LANES, store_vectors, load_vectors
 
-    def caller(tile):
-        a, b, c = load_vectors(tile, 0)
-        store_vectors(tile, 0, (b, b, c))
-        return callee(tile[0, 0, 0])
+    def caller(values):
+        return callee(values[0])
 
     run = Kernel(caller)
-    x = np.full((LANES, 1, 3), 10.0)
+    x = np.full(3, 10.0)
     print(run(x), run.plain(x), len(run.compiled.stats.cache_hits))
 """)
 

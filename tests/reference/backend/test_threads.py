@@ -63,13 +63,6 @@ def test_threads_run_at_the_speed_in_force():
     assert "compiled" not in vars(kernel)
 
 
-def test_a_slice_is_not_cut_again():
-    with set_num_threads(2):
-        counts = in_slices(parallel._num_threads.get, 100, lambda part: (), minimum=1)
-        assert counts == [1] * 2 * SLICES_PER_CORE
-        assert len(slices_of(100, minimum=1)) == 2 * SLICES_PER_CORE
-
-
 def test_an_error_in_one_slice_is_the_caller_s():
     def fail(part):
         if part.start == 50:

@@ -1,7 +1,5 @@
 """What a text file may be, and what is refused before it is read."""
 
-import os
-
 import pytest
 
 from plumbob.reference.formats.source import read_text
@@ -52,10 +50,6 @@ def test_what_is_no_text_is_refused(write, data, message):
     assert str(error.value).startswith(str(path))
 
 
-def test_a_file_of_the_largest_size_is_read(write):
-    assert read_text(write(b"a" * 10), largest=10) == "a" * 10
-
-
 def test_what_is_no_file_is_refused(tmp_path):
     with pytest.raises(ValueError, match="nothing: there is no such file"):
         read_text(tmp_path / "nothing")
@@ -67,15 +61,3 @@ def test_what_is_no_file_is_refused(tmp_path):
         read_text("a" * 5000)
     with pytest.raises(ValueError, match="path: expected a path"):
         read_text("a\0b")
-
-
-def test_a_pipe_is_refused_without_reading_it(tmp_path):
-    path = tmp_path / "pipe"
-    os.mkfifo(path)
-    with pytest.raises(ValueError, match="expected a regular file"):
-        read_text(path)
-
-
-def test_an_endless_device_is_refused():
-    with pytest.raises(ValueError, match="expected a regular file"):
-        read_text("/dev/zero")

@@ -1,5 +1,3 @@
-import itertools
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -58,17 +56,6 @@ def test_a_joint_moves_according_to_its_type(kind, backend):
     positions, rotations = pose(found, "b", j=coordinates)
     np.testing.assert_allclose(positions, x, atol=1e-15)
     np.testing.assert_allclose(rotations, R, atol=1e-15)
-
-
-def test_a_planar_joint_shifts_within_its_plane():
-    plane = joint("p", "a", "b", "planar", '<axis xyz="1 2 2"/>')
-    found = robot(link("a", "b"), plane)
-    assert found.articulation.names == ("a", "p x", "p y", "b")
-    x, y, angle = (forward_kinematics(found.articulation, unit).positions[-1] for unit in np.eye(3))
-    normal = np.array([1, 2, 2]) / 3
-    np.testing.assert_allclose([x @ normal, y @ normal, x @ y], 0.0, atol=1e-15)
-    np.testing.assert_allclose(np.cross(x, y), normal, atol=1e-15)
-    np.testing.assert_allclose(angle, 0.0, atol=1e-15)
 
 
 def test_links_keep_the_order_of_the_file_and_follow_their_parents():
@@ -177,18 +164,6 @@ def test_a_leader_that_its_followers_lock_is_read_with_a_warning():
         FormatWarning, match="that leave a range to their leader, got 'b' locked at 0"
     ):
         urdf.parse(text)
-
-
-def test_a_long_chain_of_mimics_is_no_trouble():
-    names = [str(i) for i in range(3000)]
-    parts = [
-        joint(b, a, b, "continuous", f'<mimic joint="{int(b) + 1}" offset="1"/>')
-        for a, b in itertools.pairwise(names)
-    ]
-    parts[-1] = parts[-1].replace("<mimic", "<other")
-    found = robot(link(*names), *parts).articulation
-    assert found.mimics[1] == (2999, 1.0, 2998.0)
-    assert found.coordinate_count == 1
 
 
 WRONG = {

@@ -132,12 +132,6 @@ def test_white_space_before_the_declaration_is_read_with_a_warning(reader, space
     assert f"line {2 + {urdf: 9, mjcf: 6}[reader]}: <" in message
 
 
-@pytest.mark.parametrize("before", ["x", "<a/>", "<!-- -->", "\0"])
-def test_nothing_else_comes_before_the_declaration(reader, before, refusal):
-    assert "well-formed XML" in refusal(reader.parse, before + GOOD[reader])
-    assert "well-formed XML" in refusal(reader.parse, " <?xml version='1.0' " + "a" * 10**6)
-
-
 ENCODINGS = {
     "ISO-8859-1": "ISO-8859-1",
     "Latin1": "latin1",
@@ -169,9 +163,3 @@ def test_other_encodings_than_utf_8_are_refused(encoding, refusal, tmp_path):
         f'<?xml version="1.0" encoding="{encoding}"?><robot name="\xfc"/>'.encode("l1")
     )
     assert "expected UTF-8, got byte 0xfc at offset" in refusal(urdf.read, path)
-
-
-def test_a_byte_that_the_declared_encoding_lacks_is_refused(refusal, tmp_path):
-    path = tmp_path / "a.xml"
-    path.write_bytes(b'<?xml version="1.0" encoding="windows-1252"?><robot name="\x81"/>')
-    assert "expected WINDOWS-1252, got byte 0x81" in refusal(urdf.read, path)

@@ -182,13 +182,6 @@ def test_beyond_all_links_and_slides_a_target_is_unreachable(
     assert not near.outcome.unreachable
 
 
-@pytest.mark.parametrize("kind", ["slide", "free"])
-def test_without_an_end_nothing_is_too_far(kind, solver, backend):
-    model = Articulation(Skeleton([-1, 0], [[0, 0, 0], [1.0, 0, 0]]), [kind, "fixed"])
-    solution = solve_ik(model, model.zero(), [1e3, 1e3, 0.0], solver, max_iterations=5)
-    assert not solution.outcome.unreachable
-
-
 def test_a_leader_beside_the_path_is_moved_and_all_above_it_is_not(solver, backend):
     """The finger's hinge follows a motor in another branch, below a joint that moves no effector.
 

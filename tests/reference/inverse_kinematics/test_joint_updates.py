@@ -17,11 +17,9 @@ from plumbob.reference import (
 )
 from plumbob.reference.inverse_kinematics.ccd import descend, update_joint
 from plumbob.reference.inverse_kinematics.fabrik import (
-    backward_pass,
     fabrik_update,
 )
 from plumbob.reference.inverse_kinematics.mechanism import cost, update_forward_kinematics
-from plumbob.reference.inverse_kinematics.reduce import prepare
 
 pytestmark = pytest.mark.both_backends
 
@@ -174,22 +172,6 @@ def test_a_leader_descends_by_all_that_its_followers_do(gears, machine, rng):
 # ---- FABRIK
 
 
-def test_backward_a_branch_takes_the_weighted_mean_of_what_its_children_ask(machine):
-    """A trunk with two arms of one metre, both targets straight ahead of their arms."""
-    tree = Skeleton([-1, 0, 1, 1], [[0, 0, 0], [1.0, 0, 0], [1.0, 0, 0], [0, 1.0, 0]])
-    model = Articulation(tree)
-    targets = [
-        Target([2.5, 0.0, 0.0], effector=2, weight=3.0),
-        Target([1.0, 1.2, 0.0], effector=3, weight=1.0),
-    ]
-    ready = machine(model, rotation.identity(4).ravel(), targets)
-    backward = ready.workspace.backward
-    backward_pass(*ready[:3], backward)
-    expected = (3.0 * np.array([1.5, 0.0, 0.0]) + np.array([1.0, 0.2, 0.0])) / 4.0
-    np.testing.assert_allclose(backward["position"][1], expected, rtol=0, atol=1e-15)
-    assert backward["weight"][1] == 4.0
-
-
 def test_forward_a_branch_rotates_all_its_children_alike(machine, rng):
     """A ball with three arms: one iteration rotates it as singular values say, weights regarded."""
     arms = rng.standard_normal((3, 3))
@@ -236,16 +218,3 @@ def test_fabrik_rotates_a_hinge_towards_its_child_s_backward_position_within_its
 
 
 # ---- what is merged and seen
-
-
-def test_what_a_joint_leaves_in_place_is_not_adjacent_to_it():
-    """A wrist of three hinges, the second on the first's axis, the third in the second's place."""
-    offsets = [[0, 0, 0], [0, 0, 1.0], [0, 0, 0.2], [0, 0, 0], [0.5, 0, 0]]
-    axes = [[1, 0, 0], [0, 0, 1], [0, 1, 0], [0, 0, 1], [0, 0, 1]]
-    arm = Articulation(Skeleton(range(-1, 4), offsets), ["hinge"] * 4 + ["fixed"], axes)
-    mechanism = prepare(arm, (4,), (False,)).mechanism
-    joints, effector = mechanism.adjacent[:, :4], mechanism.adjacent[:, 4]
-    assert joints[0, 1]
-    assert not joints[1:].any()
-    assert mechanism.moves[:, 0].all()
-    assert effector.tolist() == [False, True, True, True]

@@ -204,31 +204,6 @@ def test_both_speeds_take_the_same_path(problem, solver):
         np.testing.assert_allclose(plain.coordinates, fast.coordinates, rtol=0, atol=PATH)
 
 
-def test_inputs_are_unchanged_and_answers_read_only(problem, solver, backend):
-    model, q, targets = problem(["ball", "hinge", "ball"], 1)
-    targets = [t._replace(rotation=(1.0 + 1e-7) * rotation.identity()) for t in targets]
-    q = q * (1.0 + 1e-7)
-    before = q.copy(), [(t.position.copy(), t.rotation.copy()) for t in targets]
-    solution = solve_ik(model, q, targets, solver, max_iterations=3)
-    assert (q == before[0]).all()
-    for target, (position, Q) in zip(targets, before[1], strict=True):
-        assert (target.position == position).all()
-        assert (target.rotation == Q).all()
-    arrays = solution.coordinates, solution.local_rotations, solution.positions, solution.history
-    for values in arrays:
-        assert not values.flags.writeable
-
-
-def test_a_skeleton_s_coordinates_are_its_local_rotations(skeleton, local, solver, backend):
-    there = forward_kinematics(skeleton, local[::-1])
-    target = Target(there.positions[-1], there.rotations[-1], -1)
-    pose = solve_ik(skeleton, local, target, solver, max_iterations=5)
-    balls = solve_ik(Articulation(skeleton), local.ravel(), target, solver, max_iterations=5)
-    assert pose.coordinates.shape == pose.local_rotations.shape == (6, 4)
-    assert (pose.coordinates == pose.local_rotations).all()
-    assert (pose.coordinates.ravel() == balls.coordinates).all()
-
-
 def test_a_skeleton_that_was_solved_for_is_let_go_of(local):
     chain = Skeleton(range(-1, 5), np.ones((6, 3)))
     solve_ik(chain, local, Target([1.0, 1.0, 1.0], rotation.identity()), max_iterations=1)
@@ -273,19 +248,6 @@ def test_a_batch_is_its_solves(many, on_chain, restarts, rng, solver, backend):
             assert Outcome(batch.outcome[i, j]) is one.outcome
             assert (batch.history[i, j, : one.iterations + 1] == one.history).all()
             assert (batch.history[i, j, one.iterations :] == one.history[-1]).all()
-
-
-def test_rotations_make_a_batch_too(many, solver, backend):
-    model, starts, (near, _) = many
-    rotations = rotation.random(np.random.default_rng(4), 4)
-    batch = solve_ik(
-        model, starts[0, 0], Target(near.position[0], rotations, -1), solver, max_iterations=2
-    )
-    assert batch.residual_rotation.shape == (4,)
-    for i in range(4):
-        one = Target(near.position[0], rotations[i], -1)
-        single = solve_ik(model, starts[0, 0], one, solver, max_iterations=2)
-        assert (batch.coordinates[i] == single.coordinates).all()
 
 
 def test_a_batch_on_all_cores_is_the_same_as_on_one(many, rng, solver):
@@ -416,31 +378,7 @@ def test_another_unit_of_length_changes_nothing(problem, solver, backend, kinds,
         assert there.residual_rotation == pytest.approx(here.residual_rotation, abs=1e-9)
 
 
-def test_another_unit_changes_nothing_where_all_length_is_in_the_slides(solver, backend):
-    """A gantry: three slides across one another, no links."""
-    gantry = Articulation(
-        Skeleton([-1, 0, 1, 2], np.zeros((4, 3))), ["slide"] * 3 + ["fixed"],
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1]], lower=-1.0, upper=1.0,
-    )  # fmt: skip
-    target = [Target(np.array([0.3, -0.2, 0.4]), effector=3)]
-    large, start, targets_there = scaled(gantry, gantry.zero(), target, 1024.0)
-    here = solve_ik(gantry, gantry.zero(), target, solver)
-    there = solve_ik(large, start, targets_there, solver, tolerance=1024e-4)
-    assert here.outcome is Outcome.CONVERGED
-    assert there.iterations == here.iterations
-    np.testing.assert_allclose(there.coordinates, 1024.0 * here.coordinates, rtol=1e-12, atol=0)
-
-
 # ---- bad input
-
-
-def as_arrays(value):
-    """Return numbers as float64 arrays, in targets too."""
-    if isinstance(value, Target):
-        Q = value.rotation if value.rotation is None else np.array(value.rotation, dtype=float)
-        return value._replace(position=np.array(value.position, dtype=float), rotation=Q)
-    numbers = isinstance(value, list) and not any(isinstance(one, Target) for one in value)
-    return np.array(value, dtype=float) if numbers else value
 
 
 @pytest.mark.parametrize(
@@ -471,11 +409,8 @@ def as_arrays(value):
         ),
     ],
 )  # fmt: skip
-@pytest.mark.parametrize("plain", [False, True])
-def test_bad_input_is_named(change, message, plain, backend):
+def test_bad_input_is_named(change, message):
     kinds = ["hinge", "ball", "slide", "fixed"]
-    if plain:  # what is a float64 array already takes a shorter path
-        change = {name: as_arrays(value) for name, value in change.items()}
     arguments = {
         "skeleton": Articulation(Skeleton([-1, 0, 1, 2], np.eye(4, 3)), kinds),
         "local_rotations": np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]),

@@ -7,22 +7,12 @@ import pytest
 
 from plumbob.reference import (
     IK_SOLVERS,
-    Articulation,
-    Mimic,
     Outcome,
-    Skeleton,
     Target,
     forward_kinematics,
     prepare_ik,
-    rotation,
     solve_ik,
     track,
-)
-from plumbob.reference.inverse_kinematics.box_step import (
-    damped_step,
-    lean,
-    linearise_task,
-    take_step,
 )
 from plumbob.reference.inverse_kinematics.restarts import FIRST_PATIENCE
 
@@ -143,36 +133,3 @@ def test_only_levenberg_marquardt_has_phases_and_a_track_has_none(arm, task):
 
 
 # ---- what the phases are made of
-
-
-def test_a_leaning_step_comes_nearest_to_mid_range(rng, machine):
-    """Of all steps J q = e: hinges, a slide, a follower; a ball and a full circle stay in place."""
-    kinds = ["hinge", "slide", "hinge", "hinge", "ball", "hinge", "hinge"]
-    lower, upper = np.full(7, -9.0), np.full(7, 11.0)
-    links = Skeleton(range(-1, 6), 0.4 * rng.standard_normal((7, 3)))
-    axes = rotation.rotate(rotation.random(rng, 7), [0.0, 0.0, 1.0])
-    lower[[2, 3]], upper[[2, 3]] = [-2.0, -np.inf], [2.5, np.inf]
-    model = Articulation(
-        links, kinds, axes, lower=lower, upper=upper, mimics={6: Mimic(0, 0.5)}, cones=3.0
-    )
-    q = model.random(rng)
-    near = forward_kinematics(model, q)
-    target = Target(near.positions[-1] + 0.01, near.rotations[-1], 6)
-    mechanism, row, data, workspace = machine(model, q, [target])
-    linearise_task(mechanism, row, data, workspace.system)
-    J, e, own = workspace.system.J.T.copy(), workspace.system.e.copy(), data.q.copy()
-    lean(mechanism, data, workspace.system)
-    moved = np.flatnonzero(data.q != own)
-    joints = mechanism.joints
-    leads = joints["leader"] == np.arange(len(joints))
-    centred = np.flatnonzero(leads & np.isin(joints["coordinate"], moved))
-    assert {kinds[j] for j in centred} == {"hinge", "slide"}
-    unit = np.array([mechanism.reach if kinds[j] == "slide" else 1.0 for j in centred])
-    shift = np.zeros(J.shape[1])
-    shift[joints["freedom"][centred]] = (data.q - own)[moved] / unit
-    np.testing.assert_allclose(workspace.system.e, e - J @ shift, rtol=0, atol=1e-12)
-    damped_step(mechanism, data, workspace.system, 1e-12)
-    whole = shift + workspace.system.step
-    expected = shift + np.linalg.lstsq(J, e - J @ shift, rcond=None)[0]
-    np.testing.assert_allclose(whole, expected, rtol=0, atol=1e-6)
-    take_step(mechanism, data, workspace.system)

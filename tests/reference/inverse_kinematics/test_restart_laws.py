@@ -17,9 +17,7 @@ from plumbob.reference import (
 )
 from plumbob.reference.inverse_kinematics import reduce
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
-from plumbob.reference.inverse_kinematics.problem import checked_settings, checked_targets
 from plumbob.reference.inverse_kinematics.reduce import prepare
-from plumbob.reference.inverse_kinematics.solve import solve_checked
 
 COUNTS = range(13)
 # Merits come from positions recomputed: some roundings of a few metres.
@@ -198,33 +196,6 @@ def test_the_chosen_attempt_is_that_of_least_merit(name, backend):
         assert solution.merit == pytest.approx(expected.min(), rel=1e-12)
         own = forward_kinematics(model, solution.coordinates)
         assert solution.merit == pytest.approx(merits(model, own, targets, reach), rel=1e-12)
-
-
-def test_the_merit_of_one_position_is_its_residual(solver):
-    model, q, targets = problem("arm", 1)
-    solution = solve_ik(model, q, targets[0].position, solver, max_iterations=3)
-    assert solution.merit == solution.residual
-
-
-def test_a_chain_s_answer_is_the_better_of_one_start_s_and_its_restarts_with_both_histories(rng):
-    """Two sweeps arrive nowhere: which of the two is nearer differs from target to target."""
-    chain = Skeleton(range(-1, 4), rng.uniform(-1.0, 1.0, (5, 3)))
-    goals = forward_kinematics(chain, rotation.random(rng, 40, 5)).positions[:, -1]
-    settings = checked_settings("ccd", 1e-12, 1e-12, 2, 1, 3, True)
-    targets, start = checked_targets(chain, goals, None), rotation.random(rng, 5)
-    one = solve_ik(chain, start, goals, "ccd", tolerance=1e-12, max_iterations=4, record=True)
-    balls = Articulation(chain, "ball")
-    more = solve_checked(balls, start.ravel(), targets, settings)
-    best = solve_checked(chain, start, targets, settings)
-    np.testing.assert_array_equal(best.merit, np.minimum(one.merit, more.merit))
-    assert 5 < np.count_nonzero(one.merit < more.merit) < 35
-    np.testing.assert_array_equal(best.iterations, one.iterations + more.iterations)
-    for row in range(40):
-        made, further = one.iterations[row], more.iterations[row]
-        residuals = [*one.history[row, : made + 1], *more.history[row, 1 : further + 1]]
-        np.testing.assert_array_equal(best.history[row, : made + further + 1], residuals)
-        nearer = one if one.merit[row] < more.merit[row] else more
-        np.testing.assert_array_equal(best.positions[row], nearer.positions[row])
 
 
 def test_an_articulation_keeps_the_mechanisms_of_the_latest_seeds_only(monkeypatch):

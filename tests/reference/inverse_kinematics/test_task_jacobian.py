@@ -8,7 +8,6 @@ from scipy.optimize import lsq_linear
 
 from plumbob.reference import (
     Articulation,
-    Mimic,
     Outcome,
     Skeleton,
     Target,
@@ -19,7 +18,6 @@ from plumbob.reference import (
 from plumbob.reference.inverse_kinematics.box_step import (
     damped_step,
     linearise_task,
-    transposed_step,
 )
 from plumbob.reference.inverse_kinematics.jacobian_methods import (
     DAMPING_OF_POSES,
@@ -90,20 +88,6 @@ def test_errors_and_rows_are_those_of_the_jacobians(problem, machine, moving_joi
     np.testing.assert_allclose(workspace.system.J, J[:, own].T, rtol=0, atol=ROUNDING)
     others = np.setdiff1d(np.arange(model.freedom_count), own)
     assert not J[:, others].any()  # whoever is left out moves no effector
-
-
-def test_a_follower_of_another_kind_adds_to_its_leader_s_row(machine):
-    """A hinge drives a slide, as a screw does, and a slide a hinge, as a rack does."""
-    chain = Skeleton(range(-1, 4), 2.0 * np.eye(5, 3))
-    model = Articulation(
-        chain, ["hinge", "slide", "slide", "hinge", "fixed"], [1.0, 2.0, 3.0],
-        mimics={1: Mimic(0, 0.3, 0.1), 3: Mimic(2, -2.0)},
-    )  # fmt: skip
-    q, targets = np.array([0.4, -0.3]), [Target([1.0, 2.0, 0.5], rotation.identity(), 4)]
-    mechanism, target, data, workspace = machine(model, q, targets)
-    linearise_task(mechanism, target, data, workspace.system)
-    _, J = stacked(model, q, targets, mechanism.reach)
-    np.testing.assert_allclose(workspace.system.J, J.T, rtol=0, atol=ROUNDING)
 
 
 def damped(J, e, damping):
@@ -192,21 +176,6 @@ def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machin
         assert cost == pytest.approx(best.cost, rel=1e-9)
         active += np.count_nonzero(workspace.system.active)
     assert active > 100
-
-
-def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
-    for _ in range(20):
-        _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
-        joints = mechanism.joints
-        data.q[:] = np.where(rng.random(len(data.q)) < 0.5, joints["lower"], joints["upper"])
-        linearise_task(mechanism, target, data, workspace.system)
-        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
-        transposed_step(mechanism, data, workspace.system)
-        g = J.T @ e
-        free = np.where(data.q == joints["lower"], g > 0.0, g < 0.0)
-        expected = np.zeros(len(g))
-        expected[free] = transposed(J[:, free], e, None, None)
-        np.testing.assert_allclose(workspace.system.step, expected, rtol=0, atol=ROUNDING)
 
 
 @pytest.mark.parametrize("solver", STEPS)

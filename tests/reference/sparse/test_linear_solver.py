@@ -84,21 +84,3 @@ def test_a_matrix_that_is_not_square_or_not_sparse_is_named(library):
 def test_one_triangle_is_no_symmetric_pattern(matrix):
     with pytest.raises(ValueError, match=r"^matrix: expected both triangles"):
         factorize(scipy.sparse.tril(matrix, format="csc"))
-
-
-def test_entries_given_twice_are_summed(matrix, rng):
-    entries = matrix.tocoo()
-    doubled = scipy.sparse.coo_array(
-        (np.tile(entries.data / 2, 2), (np.tile(entries.row, 2), np.tile(entries.col, 2)))
-    )
-    twice = scipy.sparse.csc_array((30, 30))
-    twice.data, twice.indices, twice.indptr = raw_columns(doubled)
-    x = rng.standard_normal(30)
-    np.testing.assert_allclose(factorize(twice).solve(matrix @ x), x, rtol=0, atol=1e-12)
-
-
-def raw_columns(entries):
-    """Return data, rows and starts of columns in which entries stay apart."""
-    order = np.argsort(entries.col, kind="stable")
-    starts = np.r_[0, np.cumsum(np.bincount(entries.col, minlength=entries.shape[1]))]
-    return entries.data[order], entries.row[order], starts
