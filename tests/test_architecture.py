@@ -29,16 +29,3 @@ def test_every_package_and_module_of_a_room_has_a_box():
 def test_arrows_are_reduced(arrows, expected):
     found = draw.reduced({name: set(below) for name, below in arrows.items()})
     assert found == {name: set(below) for name, below in expected.items()}
-
-
-def test_a_box_stands_above_what_it_imports():
-    arrows = {"r/a": {"r/b", "r/c"}, "r/b": {"r/c"}, "r/c": set(), "r/d": set()}
-    assert draw.rows(arrows) == [["r/a"], ["r/b"], ["r/c", "r/d"]]
-
-
-def test_relative_imports_are_resolved(tmp_path):
-    code = "from . import near\nfrom ..room import far\nimport plumbob.reference.curve\n"
-    file = tmp_path / "module.py"
-    file.write_text(code)
-    found = draw.imports(file, "bench.package.module")
-    assert found == ("bench.package.near", "bench.room.far", "reference.curve")

@@ -2,7 +2,6 @@
 
 import importlib.util
 import re
-import sys
 import tomllib
 from pathlib import Path
 
@@ -117,32 +116,3 @@ def test_the_same_pythons_are_named_everywhere(pythons):
     assert set(SpecifierSet(PROJECT["requires-python"]).filter(pythons.PYTHONS)) == set(
         pythons.PYTHONS
     )
-
-
-@pytest.fixture
-def stand_in(tmp_path):
-    """Write a program that stands in for another one."""
-
-    def write(name, source):
-        path = tmp_path / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(f"#!{sys.executable}\nimport sys\n{source}\n")
-        path.chmod(0o755)
-        return path
-
-    return write
-
-
-REFUSES = "sys.exit('no\\n wheel' if '3.13' in sys.argv else 0)"
-
-
-def test_a_python_without_wheels_is_said_and_fails(pythons, stand_in, monkeypatch, capsys):
-    monkeypatch.setenv("UV", str(stand_in("uv", REFUSES)))
-    assert pythons.without_wheels(LOCKS[0], ["3.12", "3.13"], ["arm"]) == [
-        "Python 3.13 on arm: no wheel"
-    ]
-    monkeypatch.setattr(pythons, "LOCKS", dict([*pythons.LOCKS.items()][:1]))
-    assert pythons.main("wheels") == 1
-    assert capsys.readouterr().out.count("\n") == sum(map(len, pythons.LOCKS.values()))
-    monkeypatch.setenv("UV", str(stand_in("uv", "")))
-    assert pythons.main("wheels") == 0

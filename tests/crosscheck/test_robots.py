@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from plumbob.crosscheck.claims import ROBOT_CLAIMS, robot_claims
-from plumbob.crosscheck.engines import ROBOT_ENGINES, pinocchio_robot
+from plumbob.crosscheck.engines import ROBOT_ENGINES
 from plumbob.crosscheck.engines.robot_engine import UnreadableError
 from plumbob.crosscheck.robots import comparisons, models
 from plumbob.crosscheck.robots.comparisons import (
@@ -299,20 +299,6 @@ def test_refused_mimics_move_independently_for_both_with_a_reason(engine, small)
     assert max(differences([swept])) < 1e-14
 
 
-@pytest.mark.parametrize("engine", ROBOT_ENGINES)
-def test_engines_keep_quiet_and_leave_no_log(engine, tmp_path, monkeypatch, capfd):
-    monkeypatch.chdir(tmp_path)
-    path = tmp_path / "warns.urdf"
-    path.write_text(URDF.replace('lower="-1.5" upper="2"', 'lower="0" upper="0"'))
-    ROBOT_ENGINES[engine](path)
-    path.write_text('<robot name="empty"/>')
-    if engine == "Pinocchio":  # to MuJoCo that is an empty world
-        with pytest.raises(UnreadableError, match="there is no link in it"):
-            ROBOT_ENGINES[engine](path)
-    assert capfd.readouterr() == ("", "")
-    assert [entry.name for entry in tmp_path.iterdir()] == ["warns.urdf"]
-
-
 # Files that some engine stumbled over, all of which the reference reads as MuJoCo does.
 JOINTS = '<joint axis="1 0 0" range="-1 1"/><joint type="slide" axis="0 1 0" range="-1 1"/>'
 NESTED = f"""<mujoco><worldbody><body name="a">{BODY}{{}}
@@ -405,24 +391,6 @@ def test_files_that_would_crash_pinocchio_are_refused(name, tmp_path):
         sweep("Pinocchio", written(tmp_path, text))
     assert said in str(refused.value)
     assert max(differences([sweep("MuJoCo", written(tmp_path, text))])) < 1e-14
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [("a.urdf", chain_of_mimics(1, [0])), ("a.urdf", URDF.replace("<mimic", "<other")),
-     ("a.xml", MJCF), ("a.xml", MJCF.replace("</worldbody>", f"{B}</worldbody>"))],
-)  # fmt: skip
-def test_pinocchio_is_not_given_more_freedoms_than_memory(name, text, tmp_path, monkeypatch):
-    """The freedoms are counted in the file as Pinocchio counts them."""
-    path = written(tmp_path, text, name).path
-    count = ROBOT_ENGINES["Pinocchio"](path).model.nv
-    monkeypatch.setattr(pinocchio_robot, "MAXIMUM_FREEDOMS", count)
-    ROBOT_ENGINES["Pinocchio"](path)
-    monkeypatch.setattr(pinocchio_robot, "MAXIMUM_FREEDOMS", count - 1)
-    with pytest.raises(
-        UnreadableError, match=f"n freedoms: expected at most {count - 1}, got {count}"
-    ):
-        ROBOT_ENGINES["Pinocchio"](path)
 
 
 # Files whose mimic joints an engine or the reference does not take.

@@ -196,21 +196,6 @@ def test_random_angles_fill_their_range(lower, upper, expected, rng):
     assert expected[1] - slack <= q.max() <= expected[1]
 
 
-def test_random_balls_fill_cone_and_twist(rng):
-    cone, lower, upper = 1.0, -0.5, 2.0
-    ball = one("ball", axis=(1.0, 1.0, 0.0), lower=lower, upper=upper, cones=cone)
-    parts = [swing_twist(tuple(Q), tuple(ball.axes[0])) for Q in ball.random(rng, 1000)]
-    tilts = np.array([rotation.logarithm(swing) for swing, _ in parts])
-    twists = np.array([twist for _, twist in parts])
-    # Tilts are even over the cap of the sphere: half of them are beyond half its area.
-    assert np.median(1.0 - np.cos(np.linalg.norm(tilts, axis=1))) == pytest.approx(
-        (1.0 - np.cos(cone)) / 2, rel=0.2
-    )
-    assert lower <= twists.min() < lower + 0.1
-    assert upper - 0.1 < twists.max() <= upper
-    assert np.abs(tilts.mean(axis=0)).max() < 0.1
-
-
 vectors = st.lists(st.floats(-3.0, 3.0), min_size=3, max_size=3).map(np.array)
 directions = vectors.filter(lambda v: np.linalg.norm(v) > 0.1).map(lambda v: v / np.linalg.norm(v))
 

@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 
 from plumbob.reference import (
-    IK_SOLVERS,
-    STEP_SOLVERS,
     Articulation,
     ImplicitEuler,
     Target,
@@ -66,9 +64,3 @@ def test_what_no_target_can_hold_is_refused_where_it_is_used():
     assert Target(strange).position == strange
     with pytest.raises(ValueError, match=r"^target: expected an array of numbers"):
         solve_ik(ARM, REST, Target(strange))
-
-
-@pytest.mark.parametrize("solvers", [IK_SOLVERS, STEP_SOLVERS])
-@pytest.mark.parametrize("copied", COPIES, ids=["copy", "deepcopy", "pickle"])
-def test_solvers_come_back_from_a_pickle_as_they_were(copied, solvers):
-    assert copied(solvers) == solvers

@@ -129,12 +129,6 @@ def test_where_the_ends_meet_a_point_far_from_both_is_found(backend):
     assert even.tolist() == points[[0, 2, 3]].tolist()
 
 
-def test_points_already_well_spaced_stay(backend):
-    points = curves["circle"](50)
-    even = resample(points, min_spacing=0.05, max_spacing=0.1)
-    assert (even == points).all()
-
-
 def test_resampled_points_lie_on_the_curve(backend):
     even = resample([[0, 0, 0], [1, 0, 0], [1, 2, 0]], min_spacing=0.1, max_spacing=0.3)
     x, y, _ = even.T

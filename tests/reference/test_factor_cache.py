@@ -71,12 +71,6 @@ def test_a_pattern_is_analysed_once(network, altered, analyses, solver):
     assert len(analyses) == 2
 
 
-def test_solvers_share_what_is_alike(network, analyses):
-    integrators = [ImplicitEuler(network[0], h=h, solver=solver) for solver in STEP_SOLVERS]
-    assert sorted(analyses) == [7, 21]
-    assert len(integrators) == len(STEP_SOLVERS)
-
-
 def test_the_same_matrix_is_factorised_once(network):
     one = factor_cache.global_factor(network[0], h)
     assert factor_cache.global_factor(network[0], h) is one

@@ -81,14 +81,6 @@ def test_a_step_by_the_difference_arrives(articulated, backend, kinds, seed):
     np.testing.assert_allclose(angles, 0.0, rtol=0, atol=ROUNDING)
 
 
-def test_rotations_differ_by_the_smaller_angle(backend):
-    ball = Articulation(Skeleton([-1], np.zeros((1, 3))))
-    end = rotation.exponential([0.0, 0.0, 4.0])
-    v = difference(ball, end, rotation.identity())
-    np.testing.assert_allclose(v, [0.0, 0.0, 4.0 - 2.0 * np.pi], rtol=0, atol=1e-14)
-    assert (difference(ball, -end, rotation.identity()) == v).all()
-
-
 def test_steps_rotate_a_ball_in_its_own_frame_and_shift_a_free_joint_in_its_unmoved_one(backend):
     quarter = rotation.exponential([0.0, 0.0, np.pi / 2])
     free = Articulation(Skeleton([-1], np.zeros((1, 3))), "free")
@@ -114,17 +106,6 @@ def test_the_jacobian_of_a_joint_is_its_row_of_all(arm, q, backend):
     for wrong in ([arm.joint_count], [-1], [0.5], 0):
         with pytest.raises(ValueError, match="joints: expected "):
             jacobians(arm, q, wrong)
-
-
-def test_a_skeleton_is_an_articulation_of_balls(skeleton, local, rng, backend):
-    balls, v = Articulation(skeleton), rng.standard_normal(18)
-    assert (jacobians(skeleton, local) == jacobians(balls, local.ravel())).all()
-    assert (jacobian(skeleton, local, 2) == jacobian(balls, local.ravel(), 2)).all()
-    moved = integrate(skeleton, local, v)
-    assert moved.shape == local.shape
-    assert (moved.ravel() == integrate(balls, local.ravel(), v)).all()
-    between = difference(skeleton, moved, local)
-    assert (between == difference(balls, moved.ravel(), local.ravel())).all()
 
 
 def test_leading_axes_broadcast(arm, q, rng, backend):

@@ -109,18 +109,6 @@ class TestLattice:
         assert volume == pytest.approx(1.0)
         assert pairs(system) == edges
 
-    def test_neighbouring_cubes_share_their_faces_springs(self):
-        system, _ = scenes.lattice((3, 4, 5))
-        steps = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)]
-        count = sum((3 - a) * (4 - b) * (5 - c) for a, b, c in steps)
-        assert len(pairs(system)) == count
-
-    def test_it_is_clamped_at_x_0(self):
-        system, state = scenes.lattice((3, 2, 2))
-        clamped = np.zeros(12, dtype=bool)
-        clamped[system.pinned] = True
-        np.testing.assert_array_equal(clamped, state.positions[:, 0] == 0)
-
 
 class TestClothFromMesh:
     def test_every_edge_is_a_spring_once(self):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbob.reference import rotation
-from plumbob.reference.quaternion import half_angle, perpendicular
+from plumbob.reference.quaternion import half_angle
 
 pytestmark = pytest.mark.both_backends
 
@@ -79,22 +79,6 @@ def test_between_opposites_is_pi_about_a_fixed_axis(direction, backend):
     assert_close(q[0], 0.0)
     assert_close(rotation.rotate(q, direction), -direction, 4 * ROUNDING)
     assert (rotation.between(direction, -2 * direction) == q).all()
-
-
-@pytest.mark.parametrize(
-    ("direction", "axis"),
-    [
-        ([1, 2, 3], [0, 3, -2]),
-        ([3, 1, 2], [-2, 0, 3]),
-        ([3, 2, 1], [2, -3, 0]),
-        ([0, 0, 0], [1, 0, 0]),
-    ],
-)
-def test_the_fixed_axis_lies_across_the_coordinate_axis_the_direction_is_least_along(
-    direction, axis
-):
-    expected = np.array(axis) / np.linalg.norm(axis)
-    assert_close(perpendicular(tuple(map(float, direction))), expected)
 
 
 @pytest.mark.parametrize("angle", [1e-12, 1e-8, 1e-4, 3.0, np.pi - 1e-4, np.pi - 1e-7])

@@ -3,7 +3,6 @@
 import gc
 
 import numba
-import numpy as np
 import pytest
 from numba.core.errors import TypingError
 
@@ -74,25 +73,6 @@ def test_a_callee_is_compiled_once_for_all_integers():
     assert len(callee_of(fresh(polynomial)).signatures) == 1
 
 
-def test_a_callee_is_not_made_machine_code_by_itself():
-    (result,) = callee_of(fresh(polynomial)).overloads.values()
-    assert isinstance(result.library, linking.LinkedLibrary)
-    assert result.library.get_pointer_to_function(result.fndesc.llvm_func_name) == 0
-
-
-def twice(x):
-    return polynomial(x) + power(x, 4)
-
-
-def test_what_several_callees_call_is_linked_once():
-    dispatcher = compiled.compile_kernel(twice)
-    assert dispatcher(2.0) == twice(2.0)
-    (result,) = dispatcher.overloads.values()
-    linked = result.library._linking_libraries
-    callees = {one for one in linked if isinstance(one, linking.LinkedLibrary)}
-    assert sorted(len(list(one.get_defined_functions())) for one in callees) == [1, 1]
-
-
 def test_this_numba_is_of_a_series_that_the_linker_is_tested_with():
     """After an update of numba: run all tests of the backend, and raise `linking.NEWEST`."""
     assert linking.OLDEST == (0, 61)  # the lowest that pyproject.toml allows
@@ -111,10 +91,3 @@ def test_another_numba_compiles_as_ever(version, monkeypatch):
 @pytest.mark.parametrize(("size", "inlined"), [(10**6, True), (0, False)])
 def test_a_large_callee_in_several_places_is_not_copied(size, inlined):
     assert callee_of(fresh(polynomial), size).targetoptions["forceinline"] == inlined
-
-
-def test_numbers_are_the_same_however_it_is_compiled():
-    x = np.pi
-    expected = polynomial(x)
-    for size in (0, 10**6):
-        assert compiled.Kernel(fresh(polynomial), inlined_size=size)(x) == expected

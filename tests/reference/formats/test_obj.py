@@ -57,14 +57,6 @@ class TestReading:
         assert triangles("f 1 2 3 \\") == [[0, 1, 2]]
         assert triangles("f 1 2 3 \\\n\nf 1 2 4") == [[0, 1, 2], [0, 1, 3]]
 
-    def test_groups_materials_lines_and_free_forms_are_read_over(self):
-        text = "mtllib a.mtl\no thing\ng a b\nusemtl red\ns off\nl 1 2\np 1\ncstype bezier\n"
-        assert triangles(text + "f 1 2 3\n") == [[0, 1, 2]]
-
-    def test_weights_and_colours_are_read_over(self):
-        mesh = parse_obj("v 0 0 0 1\nv 1 0 0 0.5 0.5 0.5\nv 1 1 0\nf 1 2 3\n")
-        assert mesh.vertices[1].tolist() == [1, 0, 0]
-
     def test_a_file_is_read_whatever_its_line_ends(self, tmp_path):
         path = tmp_path / "square.obj"
         path.write_bytes((CORNERS + "f 1 2 \\\n3 4\n").replace("\n", "\r\n").encode())
@@ -110,10 +102,6 @@ class TestRefused:
             parse_obj(text, name="cube")
         assert message in str(error.value)
         assert len(str(error.value)) < 150
-
-    def test_a_continued_statement_is_named_by_its_first_line(self):
-        with pytest.raises(ValueError, match=r"^text, line 5: .*got 2"):
-            parse_obj(CORNERS + "f 1 \\\n 2\n")
 
     @pytest.mark.parametrize("text", ["", CORNERS, "# nothing\n"])
     def test_a_text_without_faces_is_refused(self, text):

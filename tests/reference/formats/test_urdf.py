@@ -129,21 +129,6 @@ def test_mimic_joints_move_by_themselves_on_demand():
     assert urdf.parse(text, mimic=False).articulation.coordinate_count == 2
 
 
-def test_leaders_keep_the_limits_of_their_followers():
-    follower = joint(
-        "c", "b", "c", inside='<mimic joint="b" multiplier="-2"/>', limit='<limit upper="1"/>'
-    )
-    limit = '<limit lower="-1" upper="1"/>'
-    text = f"<robot>{link('a', 'b', 'c')}{joint('b', 'a', 'b', limit=limit)}{follower}</robot>"
-    model = urdf.parse(text).articulation
-    assert (model.lower[1], model.upper[1]) == (-0.5, 0.0)
-    alone = urdf.parse(text, mimic=False).articulation
-    assert (alone.lower[1], alone.upper[1]) == (-1.0, 1.0)
-    beyond = text.replace('multiplier="-2"', 'offset="9"')
-    with pytest.raises(ValueError, match=r"^URDF: mimics: .* coordinate of 'b' .* follower 'c'"):
-        urdf.parse(beyond)
-
-
 def test_a_joint_without_numbers_is_locked_unless_it_follows():
     bare, limit = '<limit effort="5" velocity="1"/>', '<limit lower="-1" upper="1"/>'
     follow = '<mimic joint="b" offset="0.5"/>'
@@ -154,16 +139,6 @@ def test_a_joint_without_numbers_is_locked_unless_it_follows():
     with pytest.warns(FormatWarning, match=said):
         model = urdf.parse(text.format(joint("c", "b", "c", limit=bare))).articulation
     assert (model.lower[2], model.upper[2]) == (0, 0)
-
-
-def test_a_leader_that_its_followers_lock_is_read_with_a_warning():
-    limit, follow = '<limit lower="0" upper="0.5"/>', '<mimic joint="b" multiplier="-1"/>'
-    follower = joint("c", "b", "c", inside=follow, limit=limit)
-    text = f"<robot>{link('a', 'b', 'c')}{joint('b', 'a', 'b', limit=limit)}{follower}</robot>"
-    with pytest.warns(
-        FormatWarning, match="that leave a range to their leader, got 'b' locked at 0"
-    ):
-        urdf.parse(text)
 
 
 WRONG = {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from plumbob.reference.formats import FormatWarning, mjcf, urdf
+from plumbob.reference.formats import mjcf, urdf
 
 GOOD = {
     urdf: """<?xml version="1.0" encoding="utf-8"?>
@@ -120,16 +120,6 @@ def test_a_file_and_its_text_give_the_same_model(reader, tmp_path):
     assert a.articulation.names == b.articulation.names
     assert (a.articulation.frames == b.articulation.frames).all()
     assert (a.articulation.skeleton.offsets == b.articulation.skeleton.offsets).all()
-
-
-@pytest.mark.parametrize("space", [" ", "\n\n", "\t\r\n"])
-def test_white_space_before_the_declaration_is_read_with_a_warning(reader, space, refusal):
-    with pytest.warns(FormatWarning, match="expected <\\?xml .* first, got white space"):
-        found = reader.parse(space + GOOD[reader])
-    assert found.joints == reader.parse(GOOD[reader]).joints
-    with pytest.warns(FormatWarning):  # and lines are counted as they stand
-        message = refusal(reader.parse, "\n\n" + GOOD[reader].replace("0.5", "up"))
-    assert f"line {2 + {urdf: 9, mjcf: 6}[reader]}: <" in message
 
 
 ENCODINGS = {

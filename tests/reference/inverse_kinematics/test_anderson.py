@@ -35,15 +35,6 @@ def test_a_linear_iteration_ends_after_as_many_sweeps_as_it_has_numbers(n, rng):
     assert np.linalg.norm(mixed(B, c, start, n) - exact) > 1e-7 * np.linalg.norm(exact)
 
 
-def test_the_scale_is_that_of_units(rng):
-    """In numbers of other units, with the scale that takes them back, all is the same."""
-    B, c, x = 0.1 * rng.standard_normal((4, 4)), rng.standard_normal(4), rng.standard_normal(4)
-    units = np.array([1.0, 1e3, 1.0, 1e-2])
-    other = mixed(units[:, None] * B / units, units * c, units * x, 4, 1.0 / units)
-    np.testing.assert_allclose(other / units, mixed(B, c, x, 4), rtol=1e-9)
-    assert np.abs(mixed(B, c, x, 4, 1.0 / units) - mixed(B, c, x, 4)).max() > 1e-9
-
-
 @pytest.mark.parametrize(("distance", "share"), [(0.99, 0.05), (1.02, 0.1), (1.5, 0.5)])
 def test_long_chains_need_a_fraction_of_the_sweeps(distance, share, rng):
     n = 20

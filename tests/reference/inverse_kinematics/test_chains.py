@@ -118,15 +118,6 @@ def test_odd_chains_are_answered(name, solver, backend):
     assert solution.outcome is outcome
 
 
-@pytest.mark.parametrize("target", [[-1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-def test_one_link_rotates_even_to_its_opposite(target, solver, backend):
-    chain, rest = scenes.ball_chain(links=1, link_length=1.0)
-    solution = solve_ik(chain, rest, target, solver, tolerance=1e-9)
-    assert solution.outcome is Outcome.CONVERGED
-    if solver in ("ccd", "fabrik"):
-        assert solution.iterations == 1
-
-
 @pytest.mark.parametrize("links", [1, 2, 5])
 def test_a_hair_from_a_straight_chain_s_tip_the_answer_is_finite(links, solver, rng):
     """J J^T is singular there, and the damping of Levenberg-Marquardt is below rounding."""

@@ -75,13 +75,6 @@ def test_the_default_elsewhere_is_levenberg_marquardt_with_restarts(skeleton, lo
         same(solve_ik(tree, q, target, "levenberg_marquardt"), one)
 
 
-def test_a_list_of_a_single_target_is_that_target_and_of_a_point_a_batch(rng):
-    model = Articulation(LINKS, "hinge", AXES, lower=-2.5, upper=2.5)
-    q, x = model.random(rng), forward_kinematics(model, model.random(rng)).positions[-1]
-    same(solve_ik(model, q, [Target(x)]), solve_ik(model, q, Target(x)))
-    assert solve_ik(model, q, [x]).coordinates.shape == (1, 4)
-
-
 def test_tracking_defaults_to_ccd_on_a_skeleton_and_else_to_levenberg_marquardt(robot):
     arm, _ = scenes.lab_arm()
     curve = np.linspace([0.3, 0.2, 0.1], [0.4, 0.1, 0.2], 4)

@@ -92,19 +92,6 @@ def test_the_heavier_target_is_missed_by_less(solver, backend):
     assert second[0] < second[1] - 0.05 < second[2] - 0.1
 
 
-def test_only_the_ratio_of_weights_counts(solver, backend, rng):
-    model = figure()
-    targets, q = hands(model, rng), model.random(rng)
-    here = solve_ik(model, q, targets, solver, max_iterations=5)
-    heavy = [target._replace(weight=1024.0) for target in targets]
-    assert (
-        solve_ik(model, q, heavy, solver, max_iterations=5).coordinates == here.coordinates
-    ).all()
-    one = solve_ik(model, q, targets[0], solver, max_iterations=5)
-    single = solve_ik(model, q, heavy[0], solver, max_iterations=5)
-    assert (single.coordinates == one.coordinates).all()
-
-
 @pytest.mark.parametrize("solver", ["ccd", "fabrik", "damped_least_squares"], indirect=True)
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, order, backend):

@@ -106,17 +106,6 @@ def test_phases_give_a_batch_the_answers_of_single_calls_and_repeat_them(arm, ta
         np.testing.assert_array_equal(single.history, batch.history[i, : single.iterations + 1])
 
 
-def test_phases_come_nearer_to_targets_just_out_of_reach(arm, task):
-    """No bound knows them to be so: the best of all phases goes on."""
-    start, target = task
-    far = target._replace(position=1.3 * target.position)
-    phased = solve_ik(arm, start, far, "levenberg_marquardt", max_iterations=300)
-    alone = first_phase(arm, start, far, most=300)
-    missed = phased.outcome != Outcome.CONVERGED
-    assert np.count_nonzero(missed) > COUNT // 4
-    assert np.mean(phased.merit[missed]) < 0.9 * np.mean(alone.merit[missed])
-
-
 def test_only_levenberg_marquardt_has_phases_and_a_track_has_none(arm, task):
     start, target = task
     for solver in IK_SOLVERS:

@@ -15,7 +15,6 @@ from plumbob.reference import (
     scenes,
     solve_ik,
 )
-from plumbob.reference.inverse_kinematics import reduce
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.inverse_kinematics.reduce import prepare
 
@@ -196,18 +195,3 @@ def test_the_chosen_attempt_is_that_of_least_merit(name, backend):
         assert solution.merit == pytest.approx(expected.min(), rel=1e-12)
         own = forward_kinematics(model, solution.coordinates)
         assert solution.merit == pytest.approx(merits(model, own, targets, reach), rel=1e-12)
-
-
-def test_an_articulation_keeps_the_mechanisms_of_the_latest_seeds_only(monkeypatch):
-    monkeypatch.setattr(reduce, "LARGEST_CACHE", 4)
-    model, _, _ = readme_robot()
-    model.mechanisms["another cache"] = kept = object()
-    for seed in range(9):
-        latest = prepare(model, (3,), (False,), 0, seed)
-    assert len(model.mechanisms) == 5
-    assert model.mechanisms["another cache"] is kept
-    assert prepare(model, (3,), (False,), 0, seed) is latest
-    q, target = model.neutral(), np.array([0.4, 0.2, 0.5])
-    for seed in range(5):
-        solve_ik(model, q, target, "ccd", restarts=1, seed=seed)
-    assert len(model.mechanisms) == 5

@@ -175,17 +175,6 @@ def test_a_cloths_factor_is_as_sparse_as_minimum_degree_makes_it(size):
     assert ours.entries < 1.1 * theirs.entries
 
 
-def test_the_analysis_is_kept_for_the_same_pattern_and_made_anew_for_another(rng):
-    matrix = definite(PATTERNS["cloth"])
-    factor = CholeskyFactor(matrix)
-    assert factor.refactorize(2 * matrix).pattern is factor.pattern
-    denser = definite(PATTERNS["cloth"] + PATTERNS["cloth"] @ PATTERNS["cloth"])
-    again = factor.refactorize(denser)
-    assert again.pattern is not factor.pattern
-    b = rng.standard_normal((denser.shape[0], 3))
-    np.testing.assert_allclose(denser @ again.solve(b), b, rtol=0, atol=1e-12)
-
-
 def test_an_indefinite_matrix_is_refused_wherever_it_is(backend, matrix):
     for row in {0, matrix.shape[0] // 2, matrix.shape[0] - 1}:
         spoiled = matrix.tolil()

@@ -66,15 +66,6 @@ def test_a_right_hand_side_of_another_size_is_named(matrix, shape):
         factorize(matrix).solve(np.ones(shape))
 
 
-def test_a_right_hand_side_of_another_kind_is_converted_or_named(matrix, rng):
-    factor, b = factorize(matrix), rng.standard_normal((30, 3)).astype(np.float32)
-    expected = factor.solve(b.astype(float))
-    for same in (b, b.tolist(), np.asfortranarray(b)):
-        np.testing.assert_array_equal(factor.solve(same), expected)
-    with pytest.raises(ValueError, match=r"^b: expected an array of numbers"):
-        factor.solve("right")
-
-
 def test_a_matrix_that_is_not_square_or_not_sparse_is_named(library):
     for wrong in (np.eye(3), scipy.sparse.csc_array(np.ones((3, 2))), None):
         with pytest.raises(ValueError, match=r"^matrix: expected a square sparse matrix"):
