@@ -1,9 +1,7 @@
 """Fixtures that several rooms share."""
 
-import importlib.util
 import os
 import signal
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,16 +36,6 @@ def backend(request):
 def rng():
     """A generator of the same random numbers in every run."""
     return np.random.default_rng(20130)
-
-
-@pytest.fixture(scope="session")
-def extended_precision():
-    """Return the module of that name; there is no package to import it from."""
-    path = Path(__file__).with_name("reference") / "extended_precision.py"
-    spec = importlib.util.spec_from_file_location(path.stem, path)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def quick_names(names, every, without=()):

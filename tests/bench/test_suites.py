@@ -3,6 +3,7 @@
 import itertools
 from functools import partial
 
+import extended_precision
 import numpy as np
 import pytest
 
@@ -92,7 +93,7 @@ def test_a_claim_is_judged_as_by_the_cross_check():
     assert values["failure"] == ""
 
 
-def test_newtons_error_is_printed_as_it_is_in_fifty_digits(extended_precision):
+def test_newtons_error_is_printed_as_it_is_in_fifty_digits():
     """Measured against Newton's own answer it was 1e-17, which no float64 can be."""
     swing, k = cloth_swing(1, size=4), 10
     step, settings = partial(cloth.one_step, swing, "newton", k), {"step": 1, "h": swing.h}

@@ -1,5 +1,6 @@
 """The end of a step to 25 digits, beside the same in 50 digits by another hand."""
 
+import extended_precision
 import numpy as np
 import pytest
 
@@ -22,22 +23,22 @@ def swing(request):
     return system, state, euler.step(state).state.positions
 
 
-def digits(extended_precision, exact):
+def digits(exact):
     return extended_precision.wide(exact.positions) + extended_precision.wide(exact.remainder)
 
 
-def test_it_agrees_with_fifty_digits(swing, extended_precision):
+def test_it_agrees_with_fifty_digits(swing):
     system, state, x = swing
     known = extended_precision.Step(system, state, H).minimiser(x)
     exact = exact_step(system, state, H, x)
-    distance = extended_precision.norm(digits(extended_precision, exact) - known)
+    distance = extended_precision.norm(digits(exact) - known)
     assert distance < 1e-25
     assert exact.bound < 1e-25
     assert (exact.positions == known.astype(float)).all()
     assert extended_precision.norm(extended_precision.wide(x) - known) > 1e-17  # else nothing to do
 
 
-def test_the_error_of_an_answer_is_that_against_fifty_digits(swing, extended_precision):
+def test_the_error_of_an_answer_is_that_against_fifty_digits(swing):
     """Against Newton's own answer it would be zero."""
     system, state, x = swing
     step = extended_precision.Step(system, state, H)

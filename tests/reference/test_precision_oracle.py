@@ -2,6 +2,7 @@
 
 import itertools
 
+import extended_precision
 import mpmath
 import numpy as np
 import pytest
@@ -33,11 +34,6 @@ FAULTS = {
 }
 
 seeds = st.integers(min_value=0, max_value=10**6)
-
-
-@pytest.fixture(scope="module")
-def wide(extended_precision):
-    return extended_precision.wide
 
 
 def random_motion(seed, *, mildly=False):
@@ -84,16 +80,20 @@ class TestOracle:
     """It is right by itself."""
 
     @pytest.fixture
-    def step(self, network, extended_precision):
+    def step(self, network):
         return extended_precision.Step(*network, 0.05)
 
     @pytest.fixture
-    def x(self, step, wide, rng):
-        return step.x_n + np.where(step.free[:, None], wide(0.1 * rng.standard_normal((7, 3))), 0)
+    def x(self, step, rng):
+        return step.x_n + np.where(
+            step.free[:, None], extended_precision.wide(0.1 * rng.standard_normal((7, 3))), 0
+        )
 
-    def test_gradient_and_hessian_are_slopes(self, step, x, wide, rng):
+    def test_gradient_and_hessian_are_slopes(self, step, x, rng):
         direction = np.where(
-            step.free[:, None], wide(rng.standard_normal((7, 3))), wide(np.zeros(3))
+            step.free[:, None],
+            extended_precision.wide(rng.standard_normal((7, 3))),
+            extended_precision.wide(np.zeros(3)),
         )
         there, back = x + DX * direction, x - DX * direction
         slope = (step.value(there) - step.value(back)) / (2 * DX)
@@ -107,11 +107,9 @@ class TestForces:
     """They are off by some roundings of k (l + r), wherever the system lies."""
 
     @given(seeds, st.floats(-8.0, -1.0))
-    def test_gradient_and_hessian_are_off_by_no_more_than_allowed_for(
-        self, extended_precision, seed, exponent
-    ):
+    def test_gradient_and_hessian_are_off_by_no_more_than_allowed_for(self, seed, exponent):
         objective, x = disturbed(seed, exponent)
-        error = self.within_what_is_allowed(oracle_of(extended_precision, seed), objective, x)
+        error = self.within_what_is_allowed(oracle_of(seed), objective, x)
         assert error <= objective.evaluate(x).floor
 
     def within_what_is_allowed(self, oracle, objective, x):
@@ -129,23 +127,23 @@ class TestForces:
 class TestSteps:
     @settings(max_examples=6)
     @given(seeds)
-    def test_every_solver_ends_at_the_minimiser(self, extended_precision, seed):
+    def test_every_solver_ends_at_the_minimiser(self, seed):
         system, state, forces, pins_at, h = random_motion(seed, mildly=True)
-        oracle = oracle_of(extended_precision, seed, mildly=True)
+        oracle = oracle_of(seed, mildly=True)
         for solver in CONVERGING:
             integrator = ImplicitEuler(
                 system, h=h, solver=solver, tolerance=1e-14, max_iterations=3000
             )
             result = integrator.step(state, forces, pins_at)
             known = integrator.certify(state, result, forces, pins_at)
-            error = distance_to_minimiser(extended_precision, oracle, result.state.positions)
+            error = distance_to_minimiser(oracle, result.state.positions)
             assert known.covered
             assert error <= known.distance
             assert known.distance <= 1e-11 * (1 + np.abs(state.positions).max())
 
     @settings(max_examples=6)
     @given(seeds)
-    def test_gauss_newton_is_its_linear_step(self, extended_precision, seed):
+    def test_gauss_newton_is_its_linear_step(self, seed):
         system, state, forces, _, h = random_motion(seed)
         oracle = extended_precision.Step(system, state, h, forces)
         exact = oracle.gauss_newton()
@@ -158,7 +156,7 @@ class TestSteps:
 
 
 @pytest.fixture(scope="module")
-def beside_minimisers(extended_precision):
+def beside_minimisers():
     """Points further and further from minimisers: objective, x, and the true distance or infinity.
 
     It is infinite where Newton's method does not come from x to a minimiser.
@@ -166,7 +164,7 @@ def beside_minimisers(extended_precision):
     points = []
     for seed, exponent in itertools.product(range(8), (-14, -5, -2, -1)):
         objective, x = disturbed(seed, exponent)
-        end = oracle_of(extended_precision, seed).minimiser(x)
+        end = oracle_of(seed).minimiser(x)
         error = np.inf if end is None else extended_precision.norm(end - extended_precision.wide(x))
         points.append((objective, x, float(error)))
     return points
@@ -174,12 +172,12 @@ def beside_minimisers(extended_precision):
 
 class TestCertificate:
     @given(seeds, st.floats(-14.0, 0.0))
-    def test_a_minimiser_is_within_the_distance(self, extended_precision, seed, exponent):
+    def test_a_minimiser_is_within_the_distance(self, seed, exponent):
         objective, x = disturbed(seed, exponent)
         known = certify(objective, x)
         if known.covered:
-            oracle = oracle_of(extended_precision, seed)
-            error = distance_to_minimiser(extended_precision, oracle, x)
+            oracle = oracle_of(seed)
+            error = distance_to_minimiser(oracle, x)
             assert error <= known.distance
             # |p| <= t + L t² / (2 mu) <= 3/2 t for the true distance t, and d <= 2 eta.
             allowed = rounding_errors(objective, x).gradient / known.curvature
@@ -208,10 +206,10 @@ def is_broken(objective, x, error):
     return error > certify(objective, x).distance
 
 
-def oracle_of(extended_precision, seed, *, mildly=False):
+def oracle_of(seed, *, mildly=False):
     system, state, forces, pins_at, h = random_motion(seed, mildly=mildly)
     return extended_precision.Step(system, state, h, forces, pins_at)
 
 
-def distance_to_minimiser(extended_precision, oracle, x):
+def distance_to_minimiser(oracle, x):
     return extended_precision.norm(oracle.minimiser(x) - extended_precision.wide(x))

@@ -90,8 +90,8 @@ def equations(model, q, oriented=True, error=0.0):
 class Precise:
     """Forward kinematics in 40 digits, quaternions and axes made unit."""
 
+    @mpmath.workdps(40)
     def __init__(self, model, q):
-        mpmath.mp.dps = 40
         self.x, self.R, joints = [], [], model.joints
         for j in joints:
             position, frame = self.wide(j["offset"]), self.unit(j["frame"])

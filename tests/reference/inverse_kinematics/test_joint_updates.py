@@ -173,7 +173,7 @@ def test_a_leader_descends_by_all_that_its_followers_do(gears, machine, rng):
 
 
 def test_forward_a_branch_rotates_all_its_children_alike(machine, rng):
-    """A ball with three arms: one iteration rotates it as singular values say, weights regarded."""
+    """A ball with three arms rotates as weighted singular values say (Kabsch 1976)."""
     arms = rng.standard_normal((3, 3))
     tree = Skeleton([-1, 0, 0, 0], np.vstack([np.zeros(3), arms]))
     model, R, weights = Articulation(tree), rotation.random(rng), np.array([0.5, 1.0, 3.0])
