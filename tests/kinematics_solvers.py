@@ -10,7 +10,7 @@ from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.faults import switches
 from plumbob.verify.kinematics.predictions import predict_forward, predict_track, solve
 from plumbob.verify.laws import HOLDS
-from plumbob.verify.verify import verify
+from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 
 FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
 TRACK, RESAMPLE = "track", "resample"
@@ -39,6 +39,13 @@ def judged(task, function, method="", seed=0, **greeting):
     """Return the report on a function."""
     said = Greeting(1, (task,), methods=(method,), **greeting)
     return verify(FunctionContestant({task: function}, said), seed=seed).tasks[0]
+
+
+def judged_some(task, function, method="", every=5):
+    """Return the report on a function that is asked one case of so many."""
+    said = Greeting(1, (task,), methods=(method,))
+    cases = DISCIPLINES[task].cases(said, method, 0, False)[::every]
+    return judge_cases(FunctionContestant({task: function}, said), task, method, cases)
 
 
 def case_of(task, inputs, **facts):

@@ -131,6 +131,7 @@ LIARS = {
 }
 
 
+@pytest.mark.sample("claim")
 @pytest.mark.parametrize("liar", LIARS)
 def test_a_claim_that_contradicts_what_was_computed_is_told_once(tmp_path, liar):
     found, remarks = answers(LIARS[liar](tmp_path))
@@ -140,6 +141,7 @@ def test_a_claim_that_contradicts_what_was_computed_is_told_once(tmp_path, liar)
     assert found[-1].seconds > 1e-4
 
 
+@pytest.mark.sample("Thread")
 @pytest.mark.parametrize("begin", ["pass", "threading.Thread(target=spin, daemon=True).start()"])
 def test_an_honest_program_is_believed(tmp_path, begin):
     found, remarks = answers(program(tmp_path, HONEST_SECONDS, begin), 12)
@@ -147,6 +149,7 @@ def test_an_honest_program_is_believed(tmp_path, begin):
     assert all(one.untimed is None for one in found)
 
 
+@pytest.mark.sample("0.016")
 @pytest.mark.parametrize("seconds", ["0.0", "0.016"])
 def test_a_clock_that_ticks_seldom_is_no_lie(tmp_path, seconds):
     found, remarks = answers(program(tmp_path, seconds), 11)

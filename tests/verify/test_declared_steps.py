@@ -92,6 +92,7 @@ POSITIONS_FIRST = {
 }  # fmt: skip
 
 
+@pytest.mark.sample("declared", "a motion")
 @pytest.mark.parametrize("name", POSITIONS_FIRST)
 def test_symplectic_euler_with_positions_first_is_right_if_declared(name):
     report = judged(*POSITIONS_FIRST[name])
@@ -99,6 +100,7 @@ def test_symplectic_euler_with_positions_first_is_right_if_declared(name):
     assert report.diagnosis.explanations == ()
 
 
+@pytest.mark.sample("step0")
 @pytest.mark.parametrize("step", [Step(), pytest.param(Step("symplectic"), id="no order")])
 def test_the_order_of_updates_is_recognised_and_its_declaration_told(step):
     report = judged(PositionsFirst(), step)
@@ -108,6 +110,7 @@ def test_the_order_of_updates_is_recognised_and_its_declaration_told(step):
     assert declaration in str(report.diagnosis.behaviour)
 
 
+@pytest.mark.sample("mistake1")
 @pytest.mark.parametrize("mistake", [{"uses_old_positions": True}, {"weight": 2.0}])
 def test_a_mistake_in_a_step_with_positions_first_is_wrong(mistake):
     report = judged(PositionsFirst(**mistake), SYMPLECTIC)
@@ -226,7 +229,7 @@ KEPT = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(without=["converged", "linearised, ", "two", "three"])
+@pytest.mark.sample("with dampers", "explicit")
 @pytest.mark.parametrize("name", KEPT)
 def test_a_declared_method_that_is_kept_is_right(name):
     stepper, step = KEPT[name]

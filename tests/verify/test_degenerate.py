@@ -97,6 +97,7 @@ FABRIK = {
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 @pytest.mark.parametrize("arithmetic", ["NaN", "exceptions"])
 @pytest.mark.parametrize(("method", "causes"), [("ccd", CCD), ("fabrik", FABRIK)])
+@pytest.mark.usefixtures("verdict_alone")
 def test_solver_without_guards_is_right_except_in_degenerate_cases(
     method, causes, arithmetic, kind
 ):
@@ -120,7 +121,9 @@ def test_advice_on_divisions_by_zero_holds_in_the_plane_too():
         assert "axis" not in plain, name
 
 
+@pytest.mark.sample("fabrik")
 @pytest.mark.parametrize("method", ["ccd", "fabrik"])
+@pytest.mark.usefixtures("verdict_alone")
 def test_huge_numbers_are_a_reservation_in_degenerate_cases_only(method):
     report = judged(INVERSE, textbook(method, "huge"), method)
     assert report.verdict is RIGHT_EXCEPT
@@ -144,6 +147,7 @@ def without_numbers(local_rotations, **_):
 
 @pytest.mark.parametrize("method", ["", "ccd"])
 @pytest.mark.parametrize("solve", [raises, without_numbers])
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_solver_that_never_answers_with_a_number_passes_no_case(solve, method):
     greeting = Greeting(1, (INVERSE,), methods=(method,))
     every = DISCIPLINES[INVERSE].cases(greeting, method, 0, False)
@@ -155,7 +159,9 @@ def test_a_solver_that_never_answers_with_a_number_passes_no_case(solve, method)
     assert all(judgement.complaints for judgement in report.judgements)
 
 
+@pytest.mark.sample("True")
 @pytest.mark.parametrize("raises", [False, True])
+@pytest.mark.usefixtures("verdict_alone")
 def test_failure_in_an_ordinary_case_is_broken(raises):
     solve = textbook("fabrik")
 

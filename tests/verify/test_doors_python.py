@@ -205,7 +205,7 @@ def three_joints(body):
     return f"import helper\n{FORWARD}if len(parents) == 3:\n        {body}\n    return offsets\n"
 
 
-@pytest.mark.sample(every=2)
+@pytest.mark.sample("iter(int", "os.kill")
 @rows("survives")
 def test_a_process_survives_or_is_started_anew(solver, body, message):
     contestant = solver(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
@@ -215,6 +215,7 @@ def test_a_process_survives_or_is_started_anew(solver, body, message):
     assert isinstance(contestant.answer(case(2)), Answer)
 
 
+@pytest.mark.sample("_exit")
 @rows("cannot_load")
 def test_a_process_that_cannot_load_its_file_says_so(solver, text, message):
     with pytest.raises(NoGreetingError) as caught:
@@ -229,6 +230,7 @@ def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, argu
     assert re.search(message, said), said
 
 
+@pytest.mark.sample(every=2)
 @rows("prints")
 def test_prints_do_no_harm_and_are_remarked(solver, body, remarked):
     contestant = solver(f"import os, sys\n{FORWARD}{body}\n    return offsets\n")
@@ -259,6 +261,7 @@ def test_the_demonstration_below_the_main_guard_does_not_run(inside):
     assert inside(text).greeting.tasks == ("forward_kinematics",)
 
 
+@pytest.mark.sample("names1")
 @pytest.mark.parametrize("names", [("crosscheck", "message"), ("reference", "host", "task")])
 def test_modules_beside_the_file_are_its_own(solver, names):
     imports = "".join(f"import {name}\n" for name in names if name != "crosscheck")
@@ -283,6 +286,7 @@ def test_a_file_runs_in_its_own_folder_wherever_it_is_called_from(solver, tmp_pa
     other.close()
 
 
+@pytest.mark.sample("numpy")
 @pytest.mark.parametrize("name", ["my ik-2", "numpy", "message"])
 def test_a_file_may_have_any_name(solver, name):
     text = f"import math\n{FORWARD}return offsets + math.pi\n"

@@ -178,6 +178,7 @@ def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
     assert {name for name in known if f'"{name}"' in text} - {"system", "methods"} == fields.keys()
 
 
+@pytest.mark.sample("one mass")
 @pytest.mark.parametrize("kind", ["chains, CCD", "one mass"])
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_declared_restriction_needs_no_inference(kind):
@@ -213,6 +214,7 @@ def named_only(method, **inputs):
     return solved({"ccd": "ccd"}[method])(**inputs)
 
 
+@pytest.mark.sample("by_method")
 @pytest.mark.parametrize(("function", "methods"), [
     (by_method, ["ccd", "fabrik"]), (named_only, ["ccd"]), (solved(), [""])])  # fmt: skip
 def test_methods_are_inferred_from_answers(function, methods):
@@ -259,6 +261,7 @@ def biased(how):
     return solver
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("how", "verdict"), [
     ("shifted", Verdict.WRONG), ("rotated", Verdict.RIGHT_EXCEPT)])  # fmt: skip
 @pytest.mark.usefixtures("verdict_alone")
@@ -269,6 +272,7 @@ def test_another_answer_in_another_world_is_not_right(how, verdict):
     assert report.verdict >= verdict
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_wrong_cases_are_shown_beside_broken_ones():
     def crash_on_trees(**inputs):
         if (np.diff(inputs["parents"]) != 1).any():
@@ -283,55 +287,6 @@ def test_wrong_cases_are_shown_beside_broken_ones():
     assert "BROKEN cases: 6; the smallest" in text
     assert "WRONG cases: " in text
     assert "yours expected" in text
-
-
-# Forward kinematics of a chain in single precision, for the C++ starter.
-FLOAT_CHAIN = """
-    auto rotate = [](Quat q, Vec3 v) {
-        Vec3 u{q[1], q[2], q[3]}, t, out;
-        for (int i = 0; i < 3; ++i)
-            t[i] = 2 * (u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3]);
-        for (int i = 0; i < 3; ++i)
-            out[i] = v[i] + q[0] * t[i] + u[(i + 1) % 3] * t[(i + 2) % 3]
-                     - u[(i + 2) % 3] * t[(i + 1) % 3];
-        return out;
-    };
-    auto times = [](Quat p, Quat q) {
-        return Quat{p[0] * q[0] - p[1] * q[1] - p[2] * q[2] - p[3] * q[3],
-                    p[0] * q[1] + p[1] * q[0] + p[2] * q[3] - p[3] * q[2],
-                    p[0] * q[2] - p[1] * q[3] + p[2] * q[0] + p[3] * q[1],
-                    p[0] * q[3] + p[1] * q[2] - p[2] * q[1] + p[3] * q[0]};
-    };
-    x[0] = offsets[0], r[0] = local_rotations[0];
-    for (size_t i = 1; i < x.size(); ++i) {
-        x[i] = rotate(r[i - 1], offsets[i]), r[i] = times(r[i - 1], local_rotations[i]);
-        for (int k = 0; k < 3; ++k) x[i][k] += x[i - 1][k];
-    }
-"""
-
-
-@pytest.mark.slow
-def test_a_program_in_floats_without_branches_and_nothing_else_written(tmp_path):
-    if shutil.which("g++") is None:
-        pytest.skip("g++ is not on this machine")
-    for name, text in template("cpp").items():
-        code = text.replace('throw plumbob::missing("forward_kinematics");', FLOAT_CHAIN)
-        code = code.replace("std::array<double, ", "std::array<float, ")
-        (tmp_path / name).write_text(code)
-    command = ["g++", "-std=c++17", "-O1", "solver.cpp", "-o", "solver"]
-    subprocess.run(command, cwd=tmp_path, check=True, timeout=180, capture_output=True)
-    contestant = open_contestant([str(tmp_path / "solver")])
-    try:
-        report = verify(contestant)
-    finally:
-        contestant.close()
-    assert [task.verdict for task in report.tasks] == [
-        Verdict.RIGHT_EXCEPT, *[Verdict.BROKEN] * 4]  # fmt: skip
-    text = screen(report)
-    assert text.count("ot written yet") == 1
-    assert "Not written yet: inverse_kinematics, mass_spring_step, robot_inverse" in text
-    for field in ('"precision": "single"', '"chains_only": true', "Next: write inverse_kinematics"):
-        assert field in text
 
 
 @pytest.mark.slow

@@ -115,6 +115,7 @@ def test_neighbour_of_a_mistake_is_named(key):
     assert explanation.share >= (0.8 if "left" in key else 1.0)
 
 
+@pytest.mark.slow
 def test_squared_distances_end_the_solves_of_any_method():
     right, wrong = (
         "np.linalg.norm(target - x[effector]) <= tolerance",

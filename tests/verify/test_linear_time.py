@@ -72,7 +72,7 @@ TEXTS = {
 }
 
 
-@pytest.mark.sample(every=2)
+@pytest.mark.sample("message", "record")
 @pytest.mark.parametrize("reader", READERS)
 def test_a_reader_takes_time_in_proportion_to_the_size_of_a_text(reader):
     program = f"""

@@ -44,7 +44,7 @@ def is_named(report, fault):
     return FAULTS[fault].get("name") in first_names(report)
 
 
-@pytest.mark.sample(every=3)
+@pytest.mark.sample("forces_damping_sign")
 @pytest.mark.parametrize(("language", "fault"), SOME)
 def test_a_planted_fault_is_named(language, fault, program):
     report = judged(program(language), fault)
@@ -100,7 +100,7 @@ def unlike(one, other):
 PLANTED = [(language, fault) for language in IN for fault in IN[language]]
 
 
-@pytest.mark.sample(every=6)
+@pytest.mark.sample(every=15)
 @pytest.mark.parametrize(("language", "fault"), PLANTED)
 def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
     answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)

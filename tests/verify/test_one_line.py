@@ -56,6 +56,7 @@ def test_a_changed_line_is_named(name, monkeypatch):
     assert explanation.share == 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_known_fault_of_another_program_is_named():
     fault = coded_faults()["PB-LIMIT-010"]
@@ -66,6 +67,7 @@ def test_a_known_fault_of_another_program_is_named():
     assert explanation.share == 1.0
 
 
+@pytest.mark.slow
 def test_every_known_fault_of_every_program_compiles():
     sources = {name: source_of(name) for name in PROGRAMS}
     planted = {
@@ -93,8 +95,8 @@ def test_a_fault_is_indented_as_the_line_that_it_replaces():
     assert depths == {"step": {4}, "motion": {8}}
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.sample("capped")
 @pytest.mark.parametrize("name", HONEST)
 def test_another_honest_choice_is_no_mistake_of_a_program(name):
     method, function, options = HONEST[name]
@@ -102,7 +104,7 @@ def test_another_honest_choice_is_no_mistake_of_a_program(name):
     assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
 
 
-@pytest.mark.sample("ccd")
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["ccd", "fabrik"])
 def test_another_honest_way_to_keep_limits_is_no_mistake(method):
     without_limits = reference("inverse_kinematics", method)
@@ -222,7 +224,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
     assert search.changed_lines(report, greeting) == ()
 
 
-@pytest.mark.sample(without=["0.0"])
+@pytest.mark.slow
 @pytest.mark.parametrize("factor", [0.0, 1.0])
 @pytest.mark.usefixtures("verdict_alone")
 def test_answers_that_repeat_the_request_tell_nothing(factor):
@@ -234,6 +236,7 @@ def test_answers_that_repeat_the_request_tell_nothing(factor):
     assert changed_lines(source, "mass_spring_step") == ()
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_second_mistake_makes_no_line_likely():
     source = source_of("energy in loops")
@@ -300,7 +303,7 @@ def test_poses_are_compared_as_the_laws_read_them():
     assert explanation.share == 1.0
 
 
-@pytest.mark.sample("LINE-010", "LINE-005")
+@pytest.mark.sample("LINE-010")
 @pytest.mark.parametrize(
     ("program", "method", "right", "wrong", "code"),
     [

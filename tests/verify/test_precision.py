@@ -102,7 +102,7 @@ def judged(*arguments, **greeting):
     return verify(contestant(*arguments, **greeting)).tasks[0]
 
 
-@pytest.mark.sample(every=3)
+@pytest.mark.sample(every=8)
 @of_each_task(PRINTERS)
 def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     rounded, words = PRINTERS[printer]
@@ -113,7 +113,7 @@ def test_a_right_solver_is_right_to_the_digits_that_it_prints(task, printer):
     assert report.diagnosis.explanations == ()
 
 
-@pytest.mark.sample(every=4)
+@pytest.mark.sample(without=["step"], every=5)
 @of_each_task(["float", "float, nine digits", "cout", "to_string"])
 def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
     make, key, _ = TASKS[task]
@@ -191,6 +191,7 @@ def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hint
         assert key in report.diagnosis.explanations[0].faults
 
 
+@pytest.mark.sample(every=2)
 @EACH_TASK
 @pytest.mark.usefixtures("verdict_alone")
 def test_declared_single_precision_is_right_without_a_word(task):

@@ -35,6 +35,7 @@ def test_columns_are_derivatives_of_the_tool_s_pose(case):
     np.testing.assert_allclose(world(case.inputs), differences, atol=1e-8)
 
 
+@pytest.mark.sample(every=2)
 @pytest.mark.parametrize("name", CONVENTIONS)
 def test_every_convention_is_right_and_reported(name):
     report = report_of(lambda inputs: right_jacobian(inputs, CONVENTIONS[name]))

@@ -89,7 +89,7 @@ HONEST = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(every=3)  # each takes seconds
+@pytest.mark.sample("Levenberg")
 @pytest.mark.parametrize("name", HONEST)
 def test_no_honest_controller_is_accused(name):
     contestant = FunctionContestant({TASK: HONEST[name]}, Greeting(PROTOCOL, (TASK,)))
@@ -98,11 +98,13 @@ def test_no_honest_controller_is_accused(name):
     assert not report.diagnosis.explanations
 
 
+@pytest.mark.slow
 def test_the_program_without_a_fault_is_right():
     program = next(f for f in coded_faults().values() if f.task == TASK).right_program
     assert verify(contestant_of(program)).tasks[0].verdict <= Verdict.RIGHT_EXCEPT
 
 
+@pytest.mark.sample("tool ignored", "relative")
 @pytest.mark.parametrize("key", ["degrees", "rotation sense", "relative", "tool ignored"])
 def test_requests_that_are_misread_are_named(key):
     fault, inputs = POSE_FAULTS[key], all_cases()["curve"].inputs
@@ -266,6 +268,7 @@ def test_speeds_of_which_two_are_the_largest_have_another_limit(factor, fault):
     assert _too_fast(moved) == fault
 
 
+@pytest.mark.slow
 def test_another_constant_limit_of_speeds_is_not_taken_for_one_of_iterations():
     fault = next(f for f in coded_faults().values() if f.name == "speed limits as steps")
     right = "np.clip(q - last, -limits, limits)"

@@ -118,6 +118,7 @@ SWEPT = [
 ]  # fmt: skip
 
 
+@pytest.mark.sample("root not rotated")
 @pytest.mark.sweep("key", lambda: [fault.key for fault in SWEPT], every=60)
 def test_a_fault_of_fabrik_is_named_by_another_rule(key):
     """Faults of points show in points; those of rotations by the rule that the program has."""

@@ -56,6 +56,7 @@ def wrong_forces(masses, gravity, **_):
     return {"forces": 7.0 * masses[:, None] * gravity}
 
 
+@pytest.mark.sample("explain", "_with_cause-fails")
 @pytest.mark.parametrize("mishap", MISHAPS)
 @pytest.mark.parametrize("stage", STAGES)
 def test_a_search_that_ends_early_costs_the_name_alone(
@@ -102,6 +103,7 @@ def test_a_killed_search_leaves_the_verdict_in_all_files(tmp_path):
     assert all((tmp_path / "out" / name).stat().st_size for name in FILES)
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_path, capsys):
     functions = {"energy": lambda **_: {"total": 1.0}, "mass_spring_forces": wrong_forces}
     monkeypatch.setitem(DISCIPLINES, "energy", DISCIPLINES["energy"]._replace(judge=fails))
@@ -119,6 +121,7 @@ def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_
     assert "the judge itself failed" in " ".join(capsys.readouterr().out.split())
 
 
+@pytest.mark.usefixtures("verdict_alone")
 def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path, capsys):
     functions = {"mass_spring_forces": wrong_forces}
     report = verify(FunctionContestant(functions, Greeting(1, tuple(functions))))
