@@ -264,3 +264,34 @@ def test_room_keeps_its_budget(folder):
 def test_every_room_and_its_tests_have_a_budget():
     rooms = {folder_of(name) for name in ROOMS} - {"plumbob"}
     assert set(LINES) == rooms | {"plumbob/cli", "tests"}
+
+
+# Modules of the judge that explain a verdict; all but those that put both together decide it.
+DIAGNOSIS = {
+    "cause_search", "explain", "fault_programs", "one_line", "observe", "programs", "dictionary",
+    *(f"kinematics/{name}" for name in (
+        "claims", "early_ends", "fault_search", "faults", "jacobian_steps", "motion_faults",
+        "resample_faults", "robot_faults")),
+    *(f"mass_spring/{name}" for name in ("faults", "iterations", "relations", "search")),
+}  # fmt: skip
+BOTH = {"verify", "disciplines", "self_test", "pytest_laws", "door", "screen", "templates"}
+
+
+def explains(parts):
+    """Whether parts of a path in the judge lead to a module that explains verdicts."""
+    paths = {"/".join(parts[:end]) for end in range(1, len(parts) + 1)}
+    return bool(paths & DIAGNOSIS) or any(part.endswith("_diagnosis") for part in parts)
+
+
+def test_no_module_that_decides_a_verdict_imports_one_that_explains_it():
+    paths = [p.relative_to(ROOT) for p in (ROOT / "verify").rglob("*.py")]
+    deciding = [p for p in paths if not explains(p.with_suffix("").parts[1:])]
+    deciding = [p for p in deciding if p.with_suffix("").parts[1] not in BOTH]
+    assert len(deciding) > 40
+    wrong = {
+        (path.as_posix(), ".".join(parts))
+        for path in deciding
+        for parts in imported_relatively(path, ast.parse((ROOT / path).read_text("utf-8")))
+        if explains(parts[1:])
+    }
+    assert not wrong

@@ -1,8 +1,6 @@
 """What a solver takes without declaring it is inferred and said; diagnoses name no accident."""
 
 import json
-import shutil
-import subprocess
 
 import msgspec
 import numpy as np
@@ -10,7 +8,6 @@ import pytest
 
 from plumbob.reference import Skeleton, solve_ik
 from plumbob.reference.rotation import exponential, multiply, rotate
-from plumbob.verify.door import open_contestant
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import Verdict
@@ -19,7 +16,6 @@ from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.screen.terminal import lines
 from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.self_test import DECLARED, Stepper
-from plumbob.verify.templates import template
 from plumbob.verify.verify import verify
 
 FK, IK, FORCES, STEP = (

@@ -100,9 +100,9 @@ def test_to_a_target_within_a_tenth_of_a_metre_no_joint_rotates_by_a_radian(angl
 def test_an_answer_without_rotations_is_broken():
     exchange = hinge(0.5)
     answer = Answer({"positions": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])}, 0.0)
-    ((judgement,), diagnosis) = limits.judge([replace(exchange, answer=answer)], GREETING, True)
+    ((judgement,), misreading) = limits.judge([replace(exchange, answer=answer)], GREETING, True)
     assert judgement.verdict is Verdict.BROKEN
-    assert not diagnosis.explanations
+    assert not misreading
 
 
 @pytest.mark.parametrize("fields", [{}, {"limits": True, "planar": True}])

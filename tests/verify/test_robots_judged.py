@@ -17,13 +17,14 @@ from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import robot_models, robot_targets
 from plumbob.verify.kinematics.motion_faults import STEP_FAULTS
-from plumbob.verify.kinematics.robot_faults import FAULTS, RIGHT
+from plumbob.verify.kinematics.robot_faults import FAULTS
 from plumbob.verify.kinematics.robot_inverse_kinematics import (
     TASK,
     judge,
     solve_by_reference,
 )
 from plumbob.verify.kinematics.robot_models import tool_pose
+from plumbob.verify.kinematics.robot_readings import RIGHT
 from plumbob.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE, STEP
 from plumbob.verify.kinematics.robot_textbook import UNROTATED, rotation_error
 from plumbob.verify.kinematics.trajectories import twists_between

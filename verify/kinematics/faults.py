@@ -19,7 +19,7 @@ from .algebra import (
     SIGNED,
     UNEQUAL,
 )
-from .switches import Switches
+from .switches import ANGLES, EULER_ORDERS, Switches
 from .textbook import (
     DROPPED,
     FIXED,
@@ -33,18 +33,6 @@ from .textbook import (
 )
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-# The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
-# order, or with an axis twice in the reverse one. As in SciPy, small letters are extrinsic orders.
-EULER_ORDERS = (
-    *itertools.permutations(map("".join, itertools.permutations("XYZ")), 2),
-    *((f"{a}{b}{a}", f"{a}{b}{a}".lower()) for a, b in itertools.permutations("XYZ", 2)),
-)
-# The orders of Euler angles that are given in degrees, or of which a quaternion has the numbers.
-ANGLES = tuple(
-    (order, is_degrees)
-    for is_degrees in (True, False)
-    for order in map("".join, itertools.permutations("XYZ"))
-)
 # What a small angle of CCD ends or becomes, by the number of `small`.
 AT_SMALL = (
     sentence("the sweep ends"), sentence("the solve ends"),

@@ -10,7 +10,8 @@ from ..contestant import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Diagnosis, Verdict
 from . import rounding
-from .report import diagnosis_of, with_hints
+from .fault_search import diagnosis_of
+from .report import with_hints
 
 
 def diagnose(judged: JudgedAnswers) -> Diagnosis:

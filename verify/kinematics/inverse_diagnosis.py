@@ -6,7 +6,7 @@ from functools import partial
 
 from ..cause_search import JudgedAnswers
 from ..greeting import Greeting
-from ..judgement import Diagnosis, Verdict
+from ..judgement import Diagnosis, Explanation, Verdict
 from . import (
     claims,
     early_ends,
@@ -14,12 +14,17 @@ from . import (
     limits,
     sweeps,
 )
-from .faults import SwitchFault
+from .fault_search import diagnosis_of
+from .faults import SwitchFault, sentences_of
 from .inverse_kinematics import STOPS, is_sound, judged_trials, split
-from .report import diagnosis_of, with_hints
+from .report import with_hints
+from .sweep_diagnosis import explained, suspected_method
 from .sweeps import PoseTrial, SweepComparison
 
 MAX_FAULTS = 3
+
+
+LIMITS = sentences_of("limits")
 
 
 def diagnose(judged: JudgedAnswers) -> Diagnosis:
@@ -40,10 +45,9 @@ def diagnose(judged: JudgedAnswers) -> Diagnosis:
     ]
     diagnosis = claims.with_claims(diagnosis, judgements, answers, not base)
     if is_sound(judgements):  # what is wrong without limits is so with them
-        _, readings = limits.judge(limited, greeting, True)
-        explanations = (*diagnosis.explanations, *readings.explanations)
-        count = diagnosis.variant_count + readings.variant_count
-        diagnosis = replace(diagnosis, explanations=explanations, variant_count=count)
+        _, key = limits.judge(limited, greeting, True)
+        reading = [Explanation((key,), LIMITS[key], 1.0, 0.0)] if key else []
+        diagnosis = replace(diagnosis, explanations=(*diagnosis.explanations, *reading))
     return with_hints(judged.report.judgements, diagnosis)
 
 
@@ -52,7 +56,7 @@ def _suspicion(
 ) -> SweepComparison:
     """Return how sweeps compare with those of the method that they resemble with a fault."""
     sweep_trials = [trial for trial in trials if trial.is_sweep and trial.pose.finite]
-    method = sweeps.suspected_method(sweep_trials, greeting, base)
+    method = suspected_method(sweep_trials, greeting, base)
     others_hold = not any(trial.is_wrong for trial in trials)
     return sweeps.compare(sweep_trials, method, "", others_hold, greeting)
 
@@ -97,7 +101,7 @@ def _diagnosis(
     must = [t for t in posed_trials if t.case.requirement == "must" and t.pose.finite]
     diagnosis = Diagnosis(behaviour=comparison.behaviour)
     if any(trial.case.facts["sweeps"] == 1 for trial in wrong) or (wrong and comparison.damped):
-        diagnosis = sweeps.explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
+        diagnosis = explained(comparison, sweep_trials, wrong, greeting, max_faults, base)
     elif comparison.method:
         wrong = [t for t in wrong if t in must]
         wrong += [t for t in must if not t.is_sweep and (t.is_wrong or _ends_elsewhere(t))]

@@ -18,10 +18,9 @@ from plumbob.reference.articulation import clamp_ball
 from ..case import Case
 from ..contestant import Answer, Exchange
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Explanation, Finding, Verdict
+from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import finding, judge_case
 from . import pose_laws, problems, rounding, skeletons
-from .faults import sentences_of
 from .predictions import forward, solve
 from .problems import TargetProblem
 from .skeletons import CaseFamily
@@ -195,8 +194,8 @@ def _largest_rotation(local: FloatArray, inputs: Inputs) -> float:
 
 def judge(
     exchanges: Sequence[Exchange], greeting: Greeting, is_sound: bool
-) -> tuple[list[CaseJudgement], Diagnosis]:
-    """Return the judgements of answers to requests with limits, and how they are misread.
+) -> tuple[list[CaseJudgement], str]:
+    """Return the judgements of answers to requests with limits, and how they are misread or "".
 
     Only where answers without limits are sound, missed targets tell anything about limits.
     """
@@ -217,9 +216,7 @@ def judge(
         reference = partial(solve_within, "ccd", exchange.case.inputs)
         judgements.append(judge_case(exchange, laws, allowed, reference))
     wrong = any(judgement.verdict is Verdict.WRONG for judgement in judgements)
-    explanation = Explanation((key,), SENTENCES[key], 1.0, 0.0) if key and wrong else None
-    count = len(READINGS) if wrong else 0
-    return judgements, Diagnosis((explanation,) if explanation else (), variant_count=count)
+    return judgements, key if wrong else ""
 
 
 def _local(exchange: Exchange) -> FloatArray | None:
@@ -368,7 +365,6 @@ READINGS: Mapping[str, Reading] = {
     "twists ignored": _of_limits(partial(_without, FIELDS[2:])),
 }
 IGNORED, CLAMPED = "limits ignored", "clamped after the solve"
-SENTENCES = sentences_of("limits")
 
 
 def _ends(reading: Reading, case: Case, local: FloatArray, bound: float) -> int:

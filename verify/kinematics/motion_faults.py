@@ -17,8 +17,9 @@ from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
 from .faults import TABLE, sentences_of
 from .formulas import branches, evaluate
 from .robot_faults import FAULTS as POSE_FAULTS
-from .robot_faults import JACOBIAN_FAULTS, POSITION_ONLY, RIGHT, RobotFault
+from .robot_faults import JACOBIAN_FAULTS
 from .robot_models import feature_of, tool_pose
+from .robot_readings import POSITION_ONLY, RIGHT, RobotFault
 from .robot_targets import HALF_TURNS, LIMIT_STEP, STEP, TOLERANCE
 from .robot_textbook import ancestors, rotation_error, sine_error
 from .trajectories import (

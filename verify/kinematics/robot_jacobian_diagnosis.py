@@ -14,7 +14,7 @@ from ..judgement import LEAST_SHARE, Diagnosis, Explanation, Verdict
 from .formulas import evaluate
 from .report import with_hints
 from .robot_faults import FAULTS as POSE_FAULTS
-from .robot_faults import JACOBIAN_FAULTS, RobotFault
+from .robot_faults import JACOBIAN_FAULTS
 from .robot_jacobian import (
     CONVENTIONS,
     Convention,
@@ -23,6 +23,7 @@ from .robot_jacobian import (
     jacobian_gap,
     right_jacobian,
 )
+from .robot_readings import RobotFault
 
 # A fault is compared with all answers only if it explains one of the first.
 TRIAL = 2

@@ -20,9 +20,9 @@ from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import robot_models, rounding
 from .report import report
-from .robot_faults import RIGHT
 from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
 from .robot_models import mechanism
+from .robot_readings import RIGHT
 from .robot_textbook import Inputs
 from .skeletons import suits
 

@@ -20,9 +20,9 @@ from . import robot_jacobian_diagnosis
 from .faults import TABLE, sentences_of
 from .formulas import evaluate
 from .report import with_hints
-from .robot_faults import RIGHT
 from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
 from .robot_models import feature_of
+from .robot_readings import RIGHT
 from .robot_textbook import Inputs
 from .robot_velocity import (
     FRAMES,

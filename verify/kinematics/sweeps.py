@@ -6,7 +6,6 @@ still reach 999 of 1,000 targets.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -18,13 +17,12 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..gaps import difference
 from ..greeting import Greeting
-from ..judgement import CaseJudgement, Diagnosis, Finding, Verdict
+from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import LAWS, finding
 from . import pose_laws, rounding
 from .algebra import DEGREE
-from .faults import FAULTS, SwitchFault, by_key, describe, switches
+from .honest import HONEST, ROOT_FIRST
 from .predictions import predict_inverse, solve
-from .report import diagnosis_of
 from .switches import Switches
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
@@ -32,8 +30,6 @@ NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 MIN_SHARE = 0.5
 # A rotation smaller than this share of CCD's, or angle [rad], may be rounding and not damping.
 SMALLEST = 1e-3
-# The number of faults at once that the recognition of a method allows.
-RECOGNISED_FAULTS = 2
 LAW = "one sweep"
 # Products of unit quaternions, not normalised, stay nearer to the length 1.
 DRIFTED = 1e-2
@@ -165,7 +161,7 @@ def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
         hits = sum(error <= bound for error, bound in errors)
         if errors and hits >= MIN_SHARE * len(errors):
             return method
-    if not trials or all(_is_other_solver(trial, greeting) for trial in trials):
+    if not trials or all(is_other_solver(trial, greeting) for trial in trials):
         return ""
     for method in NAMES:
         if honest_variant(trials, method, greeting) is not None:
@@ -173,41 +169,11 @@ def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
     return "ccd" if damping_of(trials, greeting) is not None else ""
 
 
-def suspected_method(
-    trials: Sequence[PoseTrial], greeting: Greeting, base: Sequence[SwitchFault] = ()
-) -> str:
-    """Return the method that most of the sweeps are of with a fault, or ""."""
-    if not trials or all(_is_other_solver(trial, greeting) for trial in trials):
-        return ""
-    for count in range(1, RECOGNISED_FAULTS + 1):
-        fits = {method: _best_fit(trials, method, greeting, count, base) for method in NAMES}
-        best = max(fits, key=lambda method: fits[method])
-        if fits[best][0] == 1.0:
-            break
-    return best if fits[best][0] >= MIN_SHARE else ""
-
-
-def _is_other_solver(trial: PoseTrial, greeting: Greeting) -> bool:
+def is_other_solver(trial: PoseTrial, greeting: Greeting) -> bool:
     """Return whether a pose keeps all laws and has arrived, however few sweeps were requested."""
     findings = pose_laws.all_of(trial.pose, trial.case, greeting)
     keeps = all(finding.verdict < Verdict.WRONG for finding in findings)
     return keeps and _has_arrived(trial, greeting)
-
-
-def _best_fit(
-    trials: Sequence[PoseTrial],
-    method: str,
-    greeting: Greeting,
-    max_faults: int,
-    base: Sequence[SwitchFault],
-) -> tuple[float, int]:
-    """Return the share of the sweeps that a faulty textbook reproduces, and minus its faults."""
-    exchanges = [trial.comparable for trial in trials]
-    bound = partial(prediction_bound, greeting)
-    diagnosis = diagnosis_of(method, exchanges, exchanges, bound, max_faults=max_faults, base=base)
-    for explanation in diagnosis.explanations[:1]:
-        return explanation.share, -len(explanation.faults[0].split(" + "))
-    return 0.0, 0
 
 
 def _error(trial: PoseTrial, method: str, greeting: Greeting) -> tuple[float, float]:
@@ -245,16 +211,15 @@ def _ends_well(trial: PoseTrial) -> bool:
 
 def honest_variant(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> Sentence | None:
     """Return the difference between an honest solver and the textbook if it explains all sweeps."""
-    for fault in FAULTS[method]:
-        is_candidate = fault.honest and fault.key != "tolerance squared"
-        if is_candidate and _explains(trials, method, greeting, switches([fault])):
-            return describe(method, [fault.key])
+    for choice in HONEST[method]:
+        if _explains(trials, method, greeting, choice.switches):
+            return choice.sentence
     return None
 
 
 def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | None:
     """Return the scale or the cap of a CCD's rotations, if it explains all sweeps."""
-    for switched in (Switches(), switches([by_key("ccd")["root to tip"]])):
+    for switched in (Switches(), ROOT_FIRST):
         gain, cap = _damping(trials, switched)
         scaled, capped = switched._replace(gain=gain), switched._replace(cap=cap)
         is_degrees = abs(gain / DEGREE - 1.0) < SMALLEST  # radians taken for degrees, a mistake
@@ -297,29 +262,6 @@ def _explains(
         difference(predict_inverse(method, switched, trial.case), trial.pose.outputs)
         <= prediction_bound(greeting, trial.case)
         for trial in trials
-    )
-
-
-def explained(
-    comparison: SweepComparison,
-    trials: Sequence[PoseTrial],
-    wrong: Sequence[PoseTrial],
-    greeting: Greeting,
-    max_faults: int,
-    base: Sequence[SwitchFault] = (),
-) -> Diagnosis:
-    """Return the faults, up to so many at once, that reproduce the wrong sweeps among all."""
-    if not comparison.method or comparison.damped is not None:
-        return Diagnosis(behaviour=comparison.damped)
-    exchanges = {trial.case.name: trial.comparable for trial in trials}
-    return diagnosis_of(
-        comparison.method,
-        list(exchanges.values()),
-        [exchanges[trial.case.name] for trial in wrong],
-        partial(prediction_bound, greeting),
-        comparison.behaviour,
-        max_faults=max_faults,
-        base=base,
     )
 
 

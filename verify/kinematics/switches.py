@@ -1,5 +1,6 @@
 """The switches of the textbook's solvers: a number for each rule, 0 if it is right."""
 
+import itertools
 from typing import NamedTuple
 
 UNCAPPED = 10.0  # an angle that no rotation has [rad]
@@ -61,3 +62,19 @@ class Switches(NamedTuple):
     # What honest solvers do to a rotation of CCD: scale its angle, then cap it [rad].
     gain: float = 1.0
     cap: float = UNCAPPED
+
+
+# The orders in which a rotation is split into Euler angles, and put together: X, Y and Z in another
+# order, or with an axis twice in the reverse one. As in SciPy, small letters are extrinsic orders.
+EULER_ORDERS = (
+    *itertools.permutations(map("".join, itertools.permutations("XYZ")), 2),
+    *((f"{a}{b}{a}", f"{a}{b}{a}".lower()) for a, b in itertools.permutations("XYZ", 2)),
+)
+
+
+# The orders of Euler angles that are given in degrees, or of which a quaternion has the numbers.
+ANGLES = tuple(
+    (order, is_degrees)
+    for is_degrees in (True, False)
+    for order in map("".join, itertools.permutations("XYZ"))
+)

@@ -15,9 +15,10 @@ from ..contestant import Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
 from . import claims
+from .fault_search import diagnosis_of
 from .faults import TABLE, SwitchFault
 from .inverse_kinematics import METHODS
-from .report import diagnosis_of, with_hints
+from .report import with_hints
 from .track import CONTINUES, TOLERANCE, Frame, as_poses, frames_of, prediction_bound
 
 

@@ -16,9 +16,9 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..judgement import Finding
 from ..laws import finding
-from .robot_faults import RIGHT
 from .robot_models import mechanism, tool_pose
 from .robot_motions import ITERATIONS
+from .robot_readings import RIGHT
 from .robot_targets import LIMIT_STEP
 from .robot_textbook import ancestors
 

@@ -11,8 +11,6 @@ from .options import ASPECTS, Option, option_of, options_of, read_table
 
 # Aspects of which the forces and the matrix of an implicit step may have different versions.
 IN_PARTS = ("masses", "springs", "damping")
-# No solver is searched for more faults at once.
-MAX_FAULTS = 3
 
 
 def _in_parts(option: Option, entry: Mapping[str, Any]) -> Iterator[Option]:

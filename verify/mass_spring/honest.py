@@ -4,9 +4,11 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from plumbob.text.sentence import sentence
+
 from ..greeting import Step
 from .model import EXPLICIT, RIGHT_MATRIX, Integrator
-from .options import Option, options_of, read_table
+from .options import ASPECTS, Option, options_of, read_table
 
 # Symplectic Euler by the order of its updates.
 SYMPLECTIC = {"symplectic": "velocities_first", "positions_first": "positions_first"}
@@ -82,6 +84,22 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
     return step.method in (None, integrator.method) or (
         unlimited and integrator.method == "converged"
     )
+
+
+def honest_domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
+    """Return, for each aspect, the honest choices with their costs, 1 if the greeting denies them.
+
+    Those of cost 0 come first.
+    """
+    right, usual = honest(step), sentence("as it should be")
+    domains = {
+        aspect: [(option, int(not declared(option, step))) for option in right.get(aspect, ())]
+        for aspect in ASPECTS
+    }
+    return {
+        aspect: sorted(pairs, key=lambda pair: pair[1]) or [(Option("", aspect, usual), 0)]
+        for aspect, pairs in domains.items()
+    }
 
 
 def compatible(options: Mapping[str, Option]) -> bool:

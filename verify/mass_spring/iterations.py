@@ -39,9 +39,9 @@ from .model import (
     first_equation,
     predicted,
 )  # fmt: skip
+from .model_search import LARGEST, Probe
 from .options import Option, apply, read_table
 from .problem import SpringProblem
-from .search import LARGEST, Probe
 
 # The most iterations that are followed; few solvers make more. Of other methods than Newton's it is
 # that number and ten times the number of coordinates.

@@ -45,6 +45,8 @@ class Option(NamedTuple):
     at: "Callable[[float], Option] | None" = None
 
 
+# No solver is searched for more faults at once.
+MAX_FAULTS = 3
 # Parts of a step that a choice may change alone.
 PARTS = ("forces", "matrix", "energy")
 # What an entry of faults.toml may hold.

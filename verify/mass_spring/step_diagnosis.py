@@ -24,17 +24,9 @@ from . import iterations
 from .honest import compatible, honest
 from .laws import IMPRECISE, SOLVED
 from .model import StepModel, predicted
+from .model_search import UNEXPLAINED, ModelMatch, ModelSearch, Probe, gaps_of, probes_of
 from .options import ASPECTS, Option, apply
-from .search import (
-    UNEXPLAINED,
-    ModelMatch,
-    ModelSearch,
-    Probe,
-    gaps_of,
-    matches_of,
-    probes_of,
-    with_factorisation,
-)  # fmt: skip
+from .search import FaultSearch, matches_of, with_factorisation
 from .stepping import (
     describe_model,
     first_broken_step,
@@ -69,8 +61,8 @@ def diagnose(judged: JudgedAnswers) -> Diagnosis:
         probes_of(exchanges, problems, every=True),
     )
     judgements, matches = judged.report.judgements, list[ModelMatch]()
-    search = ModelSearch(telling, greeting, cause_search=cause_search)
-    honest_search = ModelSearch(telling, greeting, is_honest=True)
+    search = FaultSearch(telling, greeting, cause_search)
+    honest_search = ModelSearch(telling, greeting)
 
     def iteration_of(is_hasty: bool, least: float = IMPRECISE) -> Explanation | None:
         options: Sequence[Option] = honest_options(matches, step)
@@ -109,7 +101,7 @@ def diagnose(judged: JudgedAnswers) -> Diagnosis:
 
 
 def _matches(
-    honest_search: ModelSearch, search: ModelSearch, probes: Sequence[Probe]
+    honest_search: ModelSearch, search: FaultSearch, probes: Sequence[Probe]
 ) -> list[ModelMatch]:
     """Return the matches without a fault, or else the matches with faults."""
     cause_search, matches = search.cause_search, honest_search.run(probes)
@@ -120,7 +112,7 @@ def _matches(
 
 
 def _faults_of_larger(
-    search: ModelSearch,
+    search: FaultSearch,
     judgements: Sequence[CaseJudgement],
     probes: Sequence[Probe],
 ) -> list[ModelMatch]:
@@ -147,7 +139,7 @@ def _nearest_start(
 
 def _diagnose(
     judgements: Sequence[CaseJudgement],
-    search: ModelSearch,
+    search: FaultSearch,
     matches: Sequence[ModelMatch],
     probes: Sequence[Probe],
 ) -> Diagnosis:
@@ -182,7 +174,7 @@ def _diagnose(
     return replace(diagnosis, first_broken=first_broken_step(judgements), hints=hints)
 
 
-def _nearest(search: ModelSearch) -> Sentence:
+def _nearest(search: FaultSearch) -> Sentence:
     """Return which of the known steps comes nearest to the answers to the probes."""
     usual = {option.aspect: option for option in honest_options((), search.step)}
     steps = []

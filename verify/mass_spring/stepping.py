@@ -29,19 +29,12 @@ from ..judgement import (
 from ..laws import digits, hints_of, judge_case
 from . import laws
 from .cases import task_cases, trace_of
-from .honest import ITERATIVE, SYMPLECTIC
+from .honest import ITERATIVE, SYMPLECTIC, honest_domains
 from .laws import SOLVED, StepContext, rounding
 from .model import StepModel, predicted
+from .model_search import ModelMatch, ModelSearch, Probe, fields_of, probes_of
 from .options import ASPECTS, Option, apply
 from .problem import SpringProblem, problem_of, state_of, system_of
-from .search import (
-    ModelMatch,
-    ModelSearch,
-    Probe,
-    domains,
-    fields_of,
-    probes_of,
-)  # fmt: skip
 
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
     laws.pins, laws.declared_step, laws.velocities, laws.velocity_loss, laws.pin_velocities,
@@ -61,7 +54,7 @@ class Stepping(NamedTuple):
     def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
         """Hold answers against the step that is declared, or that an honest program makes."""
         problems = problems_of(exchanges, greeting)
-        search = ModelSearch(telling_probes(exchanges, problems), greeting, is_honest=True)
+        search = ModelSearch(telling_probes(exchanges, problems), greeting)
         matches = search.run(probes_of(exchanges, problems, every=True))
         judgements = _judge_all(exchanges, problems, greeting, matches)
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
@@ -131,7 +124,7 @@ def honest_options(matches: Sequence[ModelMatch], step: Step) -> tuple[Option, .
     options, faults = matches[0] if matches else ((), ())
     wrong = {fault.aspect for fault in faults}
     recognised = {option.aspect: option for option in options if option.aspect not in wrong}
-    choices = domains(step)
+    choices = honest_domains(step)
     usual = {aspect: choices[aspect][0][0] for aspect in ASPECTS} | recognised
     if usual["integrator"].fields["integrator"].explicit:
         for aspect, name in (("damper", "explicit"), ("velocity", "separate")):
