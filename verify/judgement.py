@@ -100,6 +100,7 @@ class Diagnosis:
     is_certain: bool = False  # whether no other cause is sought
     # by case, the answer of the same program without the fault, where many answers are right
     expected: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+    observations: tuple[Sentence, ...] = ()  # what answers show without any catalogue
 
     @property
     def share(self) -> float:

@@ -21,6 +21,7 @@ from .kinematics.claims import OF_WRONG_POSES
 from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
+from .observe import observations
 from .one_line.search import with_changed_line
 from .task import BUILDS_ON
 from .timing import with_lesser_time
@@ -71,9 +72,12 @@ def verify(
         publish(replace(report, remarks=(*remarks, _unfinished(len(reports), len(pairs)))))
     explained, is_interrupted = list[TaskReport](), False
     for attempt, verdict in zip(attempts, reports, strict=True):
-        cause_search = CauseSearch(is_interrupted)
-        explained.append(attempt.explain(verdict, explained, cause_search))
-        is_interrupted |= cause_search.is_interrupted
+        observation = CauseSearch(is_interrupted)
+        observed = attempt.observe(verdict, observation)
+        cause_search = CauseSearch(is_interrupted or observation.is_interrupted)
+        explanation = attempt.explain(verdict, explained, cause_search)
+        explained.append(_with_observations(explanation, observed))
+        is_interrupted = cause_search.is_interrupted
     return Report(contestant.greeting, explained, seed, remarks, tuple(unjudged))
 
 
@@ -143,6 +147,18 @@ class Attempt:
         for examiner in EXAMINERS if exchanges is None else (precision.examine,):
             report = examiner(self, report)
         return report
+
+    def observe(self, verdict: TaskReport, search: CauseSearch) -> tuple[Sentence, ...]:
+        """Return what wrong answers show, or why that is not known, and () of right answers."""
+
+        def observe_in_time() -> tuple[Sentence, ...]:
+            with search.limited():
+                return observations.observe(self.contestant, verdict, self._seed)
+
+        nothing: tuple[Sentence, ...] = ()
+        found = search.run(observe_in_time, nothing)
+        is_failed = search.end is not None and not search.is_interrupted
+        return (search.end,) if is_failed and search.end else found
 
     def explain(
         self, verdict: TaskReport, reports: Sequence[TaskReport], cause_search: CauseSearch
@@ -244,6 +260,13 @@ def _unless_meant(explanation: Explanation) -> Explanation:
     """Return the explanation of answers that are right if a restriction is meant."""
     words = sentence("If that is not meant: {what}", what=explanation.sentence)
     return replace(explanation, sentence=words)
+
+
+def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> TaskReport:
+    """Return a report with what its wrong answers show."""
+    if not observed:
+        return report
+    return replace(report, diagnosis=replace(report.diagnosis, observations=observed))
 
 
 def _known_faults(

@@ -26,11 +26,20 @@ HALF_TURN = 1e-6
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return skeletons in moved poses, the smallest first."""
+    return _drawn(TASK, greeting, seed, 10 if thorough else 1)
+
+
+def telling_cases(greeting: Greeting, method: str, seed: int) -> list[Case]:
+    """Return requests to ask after a wrong verdict: they tell joints apart."""
+    return _drawn(f"{TASK}, telling", greeting, seed, 1)
+
+
+def _drawn(section: str, greeting: Greeting, seed: int, repeats: int) -> list[Case]:
     return [
         Case(name, TASK, skeleton._asdict(), family.name, family.about,
              facts={"size": skeletons.extent(skeleton.offsets)})
         for name, family, skeleton in drawn(
-            TASK, CaseFamily.pose, seed, 10 if thorough else 1, greeting.planar
+            section, CaseFamily.pose, seed, repeats, greeting.planar
         )
         if skeletons.suits(skeleton.parents, greeting)
     ]  # fmt: skip

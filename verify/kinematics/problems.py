@@ -6,6 +6,7 @@ it differ.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,6 +33,8 @@ EASY, ALLOWED = 12, 60
 DRAWS = 2000
 # The most iterations of a solve by an own method whose poses are asked one by one.
 CONTINUED = 7
+# The numbers of sweeps that follow a single one, after a wrong verdict.
+COUNTED = (2, 5, 60)
 LOOSE = 1e-2
 # Sweeps of a constant number go to targets so far beyond reach [m], if no tolerance asks for more;
 # their last rotations are small and lose a digit more.
@@ -205,6 +208,26 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     is_known = method.lower() in ("", *SOLVERS) or greeting.fixed.max_iterations is not None
     own = () if is_known else problems[2:6:2]
     return [*problems, *_transformed(problems, greeting), *_continued(own)]
+
+
+def telling_cases(greeting: Greeting, method: str, seed: int) -> list[Case]:
+    """Return requests to ask after a wrong verdict: single sweeps, and the same start with more."""
+    if greeting.fixed.max_iterations:
+        return []
+    single = [
+        _case(name, family, problem, greeting, method)
+        for name, family, problem in skeletons.drawn(
+            f"{TASK}, telling", draw, seed, 1, greeting.planar
+        )
+        if skeletons.suits(problem.skeleton.parents, greeting, problem.effector)
+    ]
+    counted = [case for case in single if case.family == "counted sweeps"]
+    return [*single, *(_with_sweeps(case, n) for case in counted for n in COUNTED)]
+
+
+def _with_sweeps(case: Case, count: int) -> Case:
+    inputs, sweeps = {**case.inputs, "max_iterations": count}, {**case.facts, "sweeps": count}
+    return replace(case, name=f"{case.name}, {count} sweeps", inputs=inputs, facts=sweeps)
 
 
 def _is_about_sweeps(family: CaseFamily) -> bool:

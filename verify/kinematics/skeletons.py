@@ -180,6 +180,18 @@ def right_angle(rng: np.random.Generator) -> PosedSkeleton:
     return PosedSkeleton(np.arange(-1, 2), offsets, rotation.exponential(v))
 
 
+def partly_rotated(rng: np.random.Generator, joints: int, unrotated: int) -> PosedSkeleton:
+    """Return a chain in a random pose with a joint that is not rotated."""
+    skeleton = chain(rng, joints)
+    skeleton.local_rotations[unrotated] = rotation.identity()
+    return skeleton
+
+
+def leaves_at_three_depths(rng: np.random.Generator) -> PosedSkeleton:
+    """Return a tree in a random pose with leaves one, two and three links below the root."""
+    return chain(rng, 6)._replace(parents=np.array([-1, 0, 0, 2, 3, 2]))
+
+
 SKELETONS: dict[str, Callable[..., PosedSkeleton]] = {
     "chain": chain,
     "tree": tree,
@@ -193,6 +205,8 @@ SKELETONS: dict[str, Callable[..., PosedSkeleton]] = {
     "slight rotations": slight_rotations,
     "link of no length": link_of_no_length,
     "right angle": right_angle,
+    "partly rotated": partly_rotated,
+    "leaves at three depths": leaves_at_three_depths,
     "staircase": staircase,
     "straight": straight,
 }

@@ -64,8 +64,17 @@ class SpringScene:
 
 def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list[Case]:
     """Return the cases of a task that suit the solver."""
+    return _suitable(task, greeting, scenes(seed, thorough))
+
+
+def telling_cases(task: str, greeting: Greeting, seed: int) -> list[Case]:
+    """Return requests to ask after a wrong verdict, of which each spring's pull can be solved."""
+    drawn = [_random(seed, **entry) for entry in _TABLE["telling"]]
+    return _suitable(task, greeting, drawn)
+
+
+def _suitable(task: str, greeting: Greeting, drawn: Sequence[SpringScene]) -> list[Case]:
     system = greeting.system
-    drawn = scenes(seed, thorough)
     if greeting.planar:
         drawn = [_in_plane(scene) for scene in drawn if scene.family not in SPATIAL]
     if greeting.fixed.gravity is not None:

@@ -46,6 +46,7 @@ def _task(task: TaskReport, say: Say) -> Record:
         "assumptions": list(map(say, task.assumptions)), "digits": task.digits,
         "slowdown": task.slowdown,
         "passed": sum(judgement.verdict in GOOD for judgement in task.judgements),
+        "observations": list(map(say, diagnosis.observations)),
         "explanations": [
             {"faults": explanation.faults, "codes": explanation.codes,
              "text": say(explanation.sentence),

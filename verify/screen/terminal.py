@@ -21,6 +21,7 @@ from .words import (
     VERDICTS,
     Presentation,
     advice,
+    causes,
     digits,
     explanations,
     introduction,
@@ -148,11 +149,19 @@ def _details(
         saved = sentence('The case "{name}" is saved. To run it again:', name=failure.case.name)
         rerun = [*wrapped(say(saved), "  "), f"    {say(command)}"]
     room -= 1 + len(case) + len(rerun)
-    words = [without_repetition(words, texts) for words in explanations(task)]
-    why = paragraphs(words, say, "  ")
-    why = _shorten(why, max(2, min(why_limit, room - 3)))
+    why = _why(task, say, texts, max(2, min(why_limit, room - 3)))
     rows = numbers(failures[-1], say, room - len(why) - 1)
     return [heading, *why, *case, *rows, *rerun]
+
+
+def _why(task: TaskReport, say: Say, texts: set[str], limit: int) -> list[str]:
+    """Return what answers show and the causes, in so many lines; both keep half if cut."""
+    observed = paragraphs(task.diagnosis.observations, say, "  ")
+    words = [without_repetition(words, texts) for words in causes(task)]
+    why = paragraphs(words, say, "  ")
+    share = limit - min(len(why), limit // 2)
+    observed = _shorten(observed, share)
+    return [*observed, *_shorten(why, limit - len(observed))]
 
 
 def _failing(task: TaskReport, failure: CaseJudgement, kinds: int, say: Say) -> list[str]:

@@ -130,6 +130,12 @@ def is_unwritten(task: TaskReport) -> bool:
 
 
 def explanations(report: TaskReport) -> Iterator[Sentence]:
+    """Yield what wrong answers show, then their causes."""
+    yield from report.diagnosis.observations
+    yield from causes(report)
+
+
+def causes(report: TaskReport) -> Iterator[Sentence]:
     """Yield explanations of wrong answers, nearest first, then the inferred behaviour and hints."""
     diagnosis = report.diagnosis
     for i, explanation in enumerate(diagnosis.explanations):

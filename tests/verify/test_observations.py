@@ -1,0 +1,420 @@
+"""What wrong answers show is true, names the mistake, and is silent where nothing is wrong."""
+
+import random
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from kinematics_solvers import textbook
+from observed_programs import PROGRAMS
+
+from plumbob.reference import rotation
+from plumbob.verify.contestant import Answer
+from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.greeting import Greeting
+from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
+from plumbob.verify.laws import finding
+from plumbob.verify.mass_spring.model import Integrator, StepModel, predicted
+from plumbob.verify.mass_spring.problem import all_forces, problem_of
+from plumbob.verify.observe import (
+    equalities,
+    fits,
+    inputs,
+    joints,
+    observations,
+    separation,
+    springs,
+)
+from plumbob.verify.observe.equalities import Equalities
+from plumbob.verify.observe.separation import Table
+from plumbob.verify.verify import DISCIPLINES, verify
+
+FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
+FORCES, STEP = "mass_spring_forces", "mass_spring_step"
+WRONG = finding("positions", verdict=Verdict.WRONG)
+WRONG_FINDING = (replace(WRONG, verdict=Verdict.WRONG),)
+
+
+def report_of(contestant, task, method, seed=0):
+    """Return the report in which every answer of a solver counts as wrong."""
+    judgements = []
+    for case in DISCIPLINES[task].cases(contestant.greeting, method, seed, False):
+        expected = inputs.right_answer(case, "") if task == FORWARD else {}
+        judgements.append(CaseJudgement(case, contestant.answer(case), WRONG_FINDING, expected))
+    return TaskReport(task, method, judgements, Diagnosis())
+
+
+def contestant_of(function, task, method="", **greeting):
+    return FunctionContestant({task: function}, Greeting(1, (task,), methods=(method,), **greeting))
+
+
+def observed(function, task, method="", seed=0, **greeting):
+    """Return what is said if every answer counts as wrong."""
+    contestant = contestant_of(function, task, method, **greeting)
+    with np.errstate(all="ignore"):
+        report = report_of(contestant, task, method, seed)
+        return list(map(str, observations.observe(contestant, report, seed)))
+
+
+# What the six programs are told, as it was at the first run.
+SENTENCES = {
+    "leaves_not_rotated": ["Wrong at leaves and nowhere else: the global rotation of joints"],
+    "joints_below_not_rotated": [
+        "The global rotation of the effector is that of the request: in all 38 answers",
+        "Wrong everywhere but at children of the root: positions, given the answered local",
+    ],
+    "ten_sweeps": ["The answers do not depend on max_iterations, on which right answers do"],
+    "gravity_constant": [
+        "The answers do not depend on gravity",
+        "Gravity is (0, -9.8, 0) in all 21 cases",
+        "Without springs x' - x = h v - 9.8 h² (0, 1, 0); right is h v + h² g",
+        "Right everywhere: what springs pull",
+    ],
+    "velocities_without_h": ["Velocities are x' - x in all 42 cases"],
+    "quartic_energy": ["Every spring pulls -1/2 k l + 1/2 k l³/r² + c dl/dt"],
+}
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda program: program.__name__)
+def test_wrong_program_in_another_form_shows_its_mistake(program):
+    task, method = PROGRAMS[program]
+    sentences = observed(program, task, method)
+    expected = SENTENCES[program.__name__]
+    assert [s[: len(e)] for s, e in zip(sentences, expected, strict=False)] == expected
+    assert len(sentences) <= observations.SENTENCES + 1
+
+
+def step(integrator, damper, velocity="displacement"):
+    model = StepModel(Integrator(*integrator), damper=damper, velocity=velocity)
+    return lambda **request: predicted(problem_of(request), model)
+
+
+RIGHT = {
+    "forward kinematics": (FORWARD, "", textbook(FORWARD)),
+    "CCD": (INVERSE, "ccd", textbook(INVERSE)),
+    "FABRIK": (INVERSE, "fabrik", textbook(INVERSE, method="fabrik")),
+    "forces": (FORCES, "", lambda **request: {"forces": all_forces(problem_of(request))}),
+    "symplectic Euler": (STEP, "", step(["symplectic"], "explicit", "separate")),
+    "explicit Euler": (STEP, "", step(["explicit"], "explicit", "separate")),
+    "positions first": (STEP, "", step(["positions_first"], "explicit", "separate")),
+    "linearised": (STEP, "", step(["newton", "x_n", 1], "length_rate")),
+    "one local/global": (STEP, "", step(["local_global", "y", 1], "length_rate")),
+    "ten local/global": (STEP, "", step(["local_global", "x_n", 10], "none")),
+}
+
+
+def in_single(function):
+    """Return a function of which all numbers are single-precision values."""
+
+    def rounded(values):
+        return {
+            name: value.astype(np.float32).astype(float)
+            if isinstance(value, np.ndarray) and value.dtype == float
+            else value
+            for name, value in values.items()
+        }
+
+    return lambda **request: rounded(function(**rounded(request)))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("precision", ["double", "single"])
+@pytest.mark.parametrize("name", RIGHT)
+def test_right_program_is_told_nothing_even_if_all_its_answers_count_as_wrong(
+    name, precision, seed
+):
+    task, method, function = RIGHT[name]
+    solver = in_single(function) if precision == "single" else function
+    assert observed(solver, task, method, seed, precision=precision) == []
+
+
+# The rules against false sentences
+
+
+def tables_of_trees(count, seed):
+    """Return tables of joints with random features, of which each is wrong at a kind of joint."""
+    rng = np.random.default_rng(seed)
+    kinds = ("root", "leaf", "child_of_root", "branching", "last_joint")
+    for k in range(count):
+        table, kind = Table("rotation"), kinds[k % len(kinds)]
+        for case in range(20):
+            joints_ = int(rng.integers(2, 9))
+            parents = np.array([-1, *(int(rng.integers(0, j)) for j in range(1, joints_))])
+            features = joints.joint_features({
+                "parents": parents,
+                "offsets": rng.standard_normal((joints_, 3)),
+                "local_rotations": rotation.random(rng, joints_),
+            })  # fmt: skip
+            table.add(f"case {case}", features[kind].astype(float), features)
+        yield table
+
+
+def shuffled(table, rng):
+    """Return a table with the labels shuffled within each case."""
+    copy = Table("rotation")
+    for name in {element.case: None for element in table.elements}:
+        elements = [element for element in table.elements if element.case == name]
+        labels = [element.is_wrong for element in elements]
+        rng.shuffle(labels)
+        copy.elements += [
+            e._replace(is_wrong=label) for e, label in zip(elements, labels, strict=True)
+        ]
+    return copy
+
+
+def exact_count(tables):
+    return sum(bool((found := separation.separation(t)) and found.is_exact) for t in tables)
+
+
+def any_count(tables):
+    return sum(separation.separation(table) is not None for table in tables)
+
+
+def few_cases(table, count):
+    """Return the elements of the first cases of a table."""
+    names = list({element.case: None for element in table.elements})[:count]
+    copy = Table("rotation")
+    copy.elements = [element for element in table.elements if element.case in names]
+    return copy
+
+
+def test_separations_are_found_and_shuffled_labels_show_none(monkeypatch):
+    tables, rng = list(tables_of_trees(60, 1)), random.Random(1)
+    assert exact_count(tables) == len(tables)
+    noise = [shuffled(table, rng) for table in tables for _ in range(7)]
+    few = [few_cases(table, 3) for table in noise]
+    assert any_count([*noise, *few]) == 0
+    monkeypatch.setattr(separation, "MIN_CASES", 1)
+    monkeypatch.setattr(separation, "MAX_CHANCE", 99.0)
+    assert any_count(few) > 20
+
+
+def table(*cases, **of_all):
+    """Return a table of cases, each a list of errors, wrong at leaves where a feature says so."""
+    result = Table("rotation", **of_all)
+    for i, errors in enumerate(cases):
+        features = {"leaf": np.arange(len(errors)) == len(errors) - 1}
+        result.add(f"case {i}", errors, features)
+    return result
+
+
+def test_chance_and_support_are_needed(monkeypatch):
+    one_case = table(*[[0.0] * 40 + [1.0]] * 2, [1.0] * 5)  # 10^-3.2, but both classes in two cases
+    small = table(*[[0.0, 1.0]] * 3)  # in three cases, each with a chance of a half
+    assert separation.separation(one_case) is None
+    assert separation.separation(small) is None
+    monkeypatch.setattr(separation, "MIN_CASES", 2)
+    assert separation.separation(table(*[[0.0] * 40 + [1.0]] * 2)) is not None
+    monkeypatch.setattr(separation, "MAX_CHANCE", 0.0)
+    assert separation.separation(small) is not None
+
+
+def test_errors_between_right_and_wrong_count_for_neither(monkeypatch):
+    between = 3.0 * separation.TOLERANCE
+    cases = [[0.0, between, 0.0, 0.0, 0.0, 1.0]] * 5
+    assert separation.separation(table(*cases)) is not None
+    monkeypatch.setattr(separation, "BETWEEN", 1.0)
+    found = separation.separation(table(*cases))
+    assert found is None or not found.is_exact
+
+
+def test_one_sided_statements_allow_a_quarter_of_exceptions(monkeypatch):
+    result = Table("rotation")
+    for case in range(20):  # all wrong joints are leaves, but two more leaves are right
+        errors = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+        result.add(f"case {case}", errors, {"leaf": np.arange(6) > 2})
+    assert separation.separation(result) is None
+    monkeypatch.setattr(separation, "MAX_EXCEPTIONS", 0.9)
+    assert separation.separation(result) is not None
+
+
+def test_cases_with_a_right_verdict_have_no_wrong_elements():
+    cases = [[0.0, 0.0, 0.0, 0.0, 1.0]] * 8
+    assert separation.separation(table(*cases)) is not None
+    assert separation.separation(table(*cases, sound={f"case {i}" for i in range(8)})) is None
+
+
+@pytest.mark.parametrize(
+    ("right_gap", "cases", "is_said"), [(1.0, 3, 1), (1e-4, 9, 0), (1.0, 2, 0)]
+)
+def test_equality_counts_where_right_answers_differ_in_three_cases(right_gap, cases, is_said):
+    found = Equalities()
+    for i in range(cases):
+        found.add("root_kept", f"case {i}", np.zeros(1), np.full(1, right_gap))
+    found.add("root_kept", "at rest", np.zeros(1), np.zeros(1))
+    assert len(list(found.statements())) == is_said
+
+
+def test_equality_that_right_answers_have_is_said_without_the_rule(monkeypatch):
+    monkeypatch.setattr(equalities, "DIFFERENT", 0.0)
+    found = Equalities()
+    for i in range(9):
+        found.add("root_kept", f"case {i}", np.zeros(1), np.full(1, 1e-4))
+    assert list(found.statements())
+
+
+def spring_judgements(function, change=lambda inputs: inputs):
+    contestant = contestant_of(function, STEP)
+    judgements = []
+    for case in DISCIPLINES[STEP].cases(contestant.greeting, "", 0, False):
+        changed = replace(case, inputs={**case.inputs, **change(case.inputs)})
+        judgements.append(CaseJudgement(changed, contestant.answer(changed), WRONG_FINDING, {}))
+    return judgements
+
+
+def faster(**request):
+    answer = RIGHT["symplectic Euler"][2](**request)
+    return {**answer, "velocities": answer["velocities"] + request["h"] * request["gravity"]}
+
+
+@pytest.mark.parametrize(
+    ("change", "is_said"),
+    [({}, True), ({"h": 0.05}, False), ({"gravity": np.array([0.0, -9.81, 0.0])}, False)],
+    ids=["both differ", "one h", "one gravity"],
+)
+def test_sums_need_two_time_steps_and_two_gravities(change, is_said):
+    judgements = spring_judgements(faster, lambda inputs: change)
+    found = springs.spring_evidence(judgements, 2.0**-52).statements
+    assert any("Velocities are" in str(statement.sentence) for statement in found) is is_said
+
+
+def test_pins_and_rest_count_for_neither_side():
+    contestant = contestant_of(lambda **request: {"forces": 0.0 * request["positions"]}, FORCES)
+    judgements = report_of(contestant, FORCES, "").judgements
+    tables = springs.spring_evidence(judgements, 2.0**-52).tables
+    pinned = {j.case.name for j in judgements if len(j.case.inputs.get("pinned", ())) == 2}
+    counts = {j.case.name: len(j.case.inputs["masses"]) for j in judgements}
+    for name in pinned:
+        elements = [e for e in tables["particles"].elements if e.case == name]
+        assert 0 < len(elements) <= counts[name] - 2
+    assert not any(e.case == "one spring at rest" for e in tables["particles"].elements)
+
+
+def test_joint_without_rotation_counts_for_neither_side():
+    contestant = contestant_of(textbook(FORWARD), FORWARD)
+    report = report_of(contestant, FORWARD, "")
+    table = joints.forward_evidence(report.judgements).tables["rotation"]
+    assert not any(element.case == "arm at rest 1" for element in table.elements)
+
+
+def test_statements_on_one_sweep_need_max_iterations_to_be_read():
+    program = next(p for p in PROGRAMS if p.__name__ == "ten_sweeps")
+    contestant = contestant_of(program, INVERSE, "ccd")
+    with np.errstate(all="ignore"):
+        report = report_of(contestant, INVERSE, "ccd")
+        must = [j for j in report.judgements if j.case.requirement == "must"]
+        arguments = report, must, contestant.greeting
+        read, unread = (
+            " ".join(map(str, observations.sentences(*arguments, names)))
+            for names in ((), ("max_iterations",))
+        )
+    assert "in one sweep of CCD" in read
+    assert "in one sweep of CCD" not in unread
+
+
+def test_inputs_count_only_if_right_answers_change(monkeypatch):
+    contestant = contestant_of(textbook(INVERSE), INVERSE, "ccd")
+    cases = DISCIPLINES[INVERSE].cases(contestant.greeting, "ccd", 0, False)
+    arguments = contestant, cases, contestant.greeting, "ccd"
+    assert inputs.unread_inputs(*arguments) == []
+    monkeypatch.setattr(inputs, "TIGHT", 0.0)
+    monkeypatch.setattr(inputs, "SWEEPS", 1)
+    monkeypatch.setattr(inputs, "FEW_SWEEPS", 1)
+    assert inputs.unread_inputs(*arguments) == []  # one sweep, which no tolerance ends
+    monkeypatch.setattr(inputs, "DIFFERENT", -1.0)
+    monkeypatch.setattr(inputs, "_arrives", lambda case, answer: True)
+    assert "tolerance" in inputs.unread_inputs(*arguments)
+
+
+def test_plainest_sum_is_chosen_and_nearly_right_ones_are_right():
+    rng = np.random.default_rng(1)
+    a, b = rng.standard_normal((2, 20))
+    assert fits.fit(a, {"a": a, "2 a": 2.0 * a}, 1) == [(1.0, "a")]
+    assert fits.fit(a + b, {"a": a, "same": a, "b": b}, 3) == [(1.0, "a"), (1.0, "b")]
+    assert fits.fit(a[:5], {"a": a[:5]}, 1) is None  # too few numbers
+    assert fits.is_sum([fits.Term(0.99998, "a")], {"a": 1.0})
+    assert not fits.is_sum([fits.Term(0.999, "a")], {"a": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("terms", "words"),
+    [
+        ([(-0.5, "k l"), (1.0, "k r")], "-1/2 k l + k r"),
+        ([(-9.8, "h²")], "-9.8 h²"),
+        ([(1.0, "a"), (-1.0, "b")], "a - b"),
+        ([], "0"),
+    ],
+)
+def test_sums_are_written_as_formulas(terms, words):
+    assert fits.formula([fits.Term(*term) for term in terms]) == words
+
+
+def _with_verdicts(report, verdict):
+    findings = (replace(WRONG, verdict=verdict),)
+    judgements = [replace(judgement, findings=findings) for judgement in report.judgements]
+    return replace(report, judgements=judgements)
+
+
+def test_only_wrong_answers_to_enough_must_cases_are_observed():
+    program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
+    contestant = contestant_of(program, FORWARD)
+    report = report_of(contestant, FORWARD, "")
+    assert observations.observe(contestant, report, 0)
+    for verdict in (Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.UNDECIDED):
+        assert observations.observe(contestant, _with_verdicts(report, verdict), 0) == ()
+    few = replace(report, judgements=report.judgements[-13:])
+    assert observations.observe(contestant, few, 0) == ()
+    may = [
+        replace(judgement, case=replace(judgement.case, requirement="may"))
+        for judgement in report.judgements
+    ]
+    assert observations.observe(contestant, replace(report, judgements=may), 0) == ()
+
+
+# Beside the verdict and the search for causes
+
+
+def test_requests_that_tell_more_are_not_counted():
+    asked = []
+
+    def program(**request):
+        asked.append(request)
+        return PROGRAM(**request)
+
+    PROGRAM = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
+    contestant = contestant_of(program, FORWARD)
+    report = report_of(contestant, FORWARD, "")
+    count = len(asked)
+    assert observations.observe(contestant, report, 0)
+    assert len(asked) > count
+    assert len(report.judgements) == count
+
+
+def test_error_of_the_observation_costs_no_verdict(monkeypatch):
+    def fails(*arguments):
+        raise RuntimeError("no luck")
+
+    program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
+    contestant = contestant_of(program, FORWARD)
+    with_words = verify(contestant).tasks[0]
+    monkeypatch.setattr(observations, "observe", fails)
+    without = verify(contestant).tasks[0]
+    assert without.verdict is with_words.verdict is Verdict.WRONG
+    assert "no luck" in str(without.diagnosis.observations[0])
+    assert [e.faults for e in without.diagnosis.explanations] == [
+        e.faults for e in with_words.diagnosis.explanations
+    ]
+
+
+def test_observations_stay_if_the_search_for_causes_fails(monkeypatch):
+    def fails(*arguments):
+        raise RuntimeError("no cause")
+
+    program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
+    module = sys.modules["plumbob.verify.verify"]
+    monkeypatch.setattr(module.Attempt, "_explain", fails)
+    report = module.verify(contestant_of(program, FORWARD)).tasks[0]
+    assert report.verdict is Verdict.WRONG
+    assert "at leaves and nowhere else" in str(report.diagnosis.observations[0])
+    assert "no cause" in str(report.diagnosis.hints[0])

@@ -1,0 +1,1 @@
+"""What wrong answers show by themselves, without any catalogue of mistakes."""

@@ -1,0 +1,49 @@
+"""Equalities that all answers have and right answers have not."""
+
+from collections.abc import Iterator, Set
+from typing import Any
+
+import numpy as np
+
+from plumbob.text.sentence import sentence
+
+from .separation import MIN_CASES, TOLERANCE, Statement, words_of
+
+# Right answers differ from an equality if their gap is larger: far more than rounding, so that no
+# equality is reported that right answers nearly have.
+DIFFERENT = 1e-3
+
+
+class Equalities:
+    """Gaps of equalities in answers, and in right answers, by case."""
+
+    def __init__(self, sound: Set[str] = frozenset()) -> None:
+        self._sound = sound  # cases with a right verdict
+        # by the equality and the case: whether the answer has it, and whether a right one differs
+        self._cases: dict[str, dict[str, tuple[bool, bool]]] = {}
+
+    def add(self, equality: str, case: str, gaps: Any, right_gaps: Any) -> None:
+        """Add the gaps of a case, of one element or several."""
+        if np.size(gaps):
+            holds = bool((np.asarray(gaps) <= TOLERANCE).all())
+            differs = bool((np.asarray(right_gaps) > DIFFERENT).any()) and case not in self._sound
+            self._cases.setdefault(equality, {})[case] = holds, differs
+
+    def remove(self, *names: str) -> None:
+        """Forget equalities."""
+        for name in names:
+            self._cases.pop(name, None)
+
+    def statements(self) -> Iterator[Statement]:
+        """Yield the equalities of all answers that right answers do not have in enough cases."""
+        for name, cases in self._cases.items():
+            count, different = len(cases), sum(differs for _, differs in cases.values())
+            if different >= MIN_CASES and all(holds for holds, _ in cases.values()):
+                words = sentence(
+                    "{equality}: in all {count} answers that tell, and in {others} of the right "
+                    "answers.",
+                    count=count,
+                    equality=words_of("equality", name),
+                    others=count - different,
+                )
+                yield Statement(-float(different), words, is_exact=True)

@@ -1,0 +1,269 @@
+"""Where a quantity is wrong: the feature that all wrong elements have, and no right element has.
+
+An element is a joint, a particle or a whole case. A statement needs evidence that chance does not
+give: wrong and right elements side by side in some cases, and few features for many elements.
+"""
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence, Set
+from math import comb, log10
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.text.sentence import Sentence, sentence
+
+# Relative errors up to this are right: above rounding in single precision, which is about 1e-6
+# after a dozen operations. Errors of more than BETWEEN times as much are wrong, and errors between
+# the two count for neither: they may be a large rounding or a small mistake.
+TOLERANCE, BETWEEN = 1e-5, 10.0
+# The number of cases in which wrong and right elements must stand side by side, or of wrong and of
+# right cases: two coincide too often.
+MIN_CASES = 3
+# The logarithm of the expected number of features that separate shuffled labels: 1 %. A feature
+# that separates one side alone needs the square of that, since it has more ways to be true.
+MAX_CHANCE = -2.0
+# Elsewhere a one-sided statement allows at most this share of exceptions: with more it says little.
+MAX_EXCEPTIONS = 0.25
+# A quantity is reported as right everywhere if it has so many elements.
+MIN_RIGHT = 10
+# Alternatives to a statement that are printed.
+MAX_ALTERNATIVES = 2
+
+# Quantities that no honest choice changes: wrong everywhere, they say most.
+LAWS = ("agreement", "length", "root_position", "rotation", "position")
+
+_TABLE = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
+
+
+def words_of(kind: str, key: str) -> Sentence:
+    """Return the words of a feature, a quantity or an equality."""
+    return Sentence(_TABLE[kind][key]["sentence"], {})
+
+
+class Element(NamedTuple):
+    """A joint, a particle or a case, of which a quantity is right or wrong."""
+
+    case: str
+    is_wrong: bool
+    features: Mapping[str, bool | float]
+
+
+class Predicate(NamedTuple):
+    """A feature, its negation, or a bound of a number, and the elements that have the feature."""
+
+    words: Sentence
+    is_negation: bool
+    mask: BoolArray
+
+
+class Statement(NamedTuple):
+    """What a table shows: a smaller score is less likely to be chance."""
+
+    score: float  # the logarithm of the number of such statements that chance would make
+    sentence: Sentence
+    is_exact: bool
+
+
+class Table:
+    """The elements of a quantity; cases with a right verdict, the sound ones, have no wrong one.
+
+    What differs from the usual in a sound case is another honest choice.
+    """
+
+    def __init__(self, quantity: str, sound: Set[str] = frozenset(), is_of_cases: bool = False):
+        self.quantity, self.is_of_cases = words_of("quantity", quantity), is_of_cases
+        self._sound, self.is_law = sound, quantity in LAWS
+        self.elements: list[Element] = []
+
+    def add(
+        self,
+        case: str,
+        errors: Any,
+        features: Mapping[str, Any],
+        tolerance: float = TOLERANCE,
+        is_counted: Any = True,
+    ) -> None:
+        """Add the elements of a case by their errors; features are arrays or shared by all.
+
+        Elements that are not counted are left out, as are errors between right and wrong.
+        """
+        errors = np.atleast_1d(np.asarray(errors, dtype=float))
+        wrong = ~(errors <= BETWEEN * tolerance)  # NaN is wrong
+        is_clear = (errors <= tolerance) | (wrong if case not in self._sound else False)
+        columns = {name: np.asarray(values).tolist() for name, values in features.items()}
+        for i in np.flatnonzero(is_clear & is_counted).tolist():
+            row = {name: c[i] if isinstance(c, list) else c for name, c in columns.items()}
+            self.elements.append(Element(case, bool(wrong[i]), row))
+
+    @property
+    def wrong_count(self) -> int:
+        """Number of wrong elements."""
+        return sum(element.is_wrong for element in self.elements)
+
+    @property
+    def is_right(self) -> bool:
+        """Whether there are enough elements, and all are right."""
+        return not self.wrong_count and len(self.elements) >= MIN_RIGHT
+
+    @property
+    def is_wrong_everywhere(self) -> bool:
+        """Whether there are enough elements, and all are wrong."""
+        return len(self.elements) == self.wrong_count >= MIN_RIGHT
+
+    def right_words(self) -> Sentence:
+        """Return the quantity with the number of its elements."""
+        return sentence("{quantity} ({count})", quantity=self.quantity, count=len(self.elements))
+
+
+def separation(table: Table) -> Statement | None:
+    """Return the feature of all wrong elements and no others, else a one-sided one, else None.
+
+    Joints and particles are compared within the cases that have wrong ones: elsewhere a mistake
+    could not show.
+    """
+    wrong_cases = {element.case for element in table.elements if element.is_wrong}
+    elements = [e for e in table.elements if table.is_of_cases or e.case in wrong_cases]
+    wrong = np.array([element.is_wrong for element in elements], dtype=bool)
+    if not elements or wrong.all():
+        return None
+    if _support(elements, wrong, table.is_of_cases) < MIN_CASES:
+        return None
+    predicates = list(_predicates(elements, wrong))
+    chance = _log_chance(elements, table.is_of_cases)
+    chance += log10(max(len(predicates), 1))
+    exact = [predicate for predicate in predicates if (predicate.mask == wrong).all()]
+    if exact and chance <= MAX_CHANCE:
+        return Statement(chance, _exact_words(table.quantity, exact, wrong), is_exact=True)
+    if exact or chance > 2.0 * MAX_CHANCE:
+        return None
+    sides = [side for p in predicates if (side := _one_sided(table.quantity, p, wrong, elements))]
+    best = max(sides, key=lambda side: side[0], default=None)
+    return None if best is None else Statement(chance / 4.0, best[1], is_exact=False)
+
+
+def _support(elements: Sequence[Element], wrong: BoolArray, is_of_cases: bool) -> int:
+    """Return the number of cases in which both classes stand, or of the rarer class of cases."""
+    if is_of_cases:
+        return int(min(wrong.sum(), (~wrong).sum()))
+    return sum(0 < sum(labels) < len(labels) for labels in _labels(elements).values())
+
+
+def _labels(elements: Sequence[Element]) -> dict[str, list[bool]]:
+    labels: dict[str, list[bool]] = {}
+    for element in elements:
+        labels.setdefault(element.case, []).append(element.is_wrong)
+    return labels
+
+
+def _log_chance(elements: Sequence[Element], is_of_cases: bool) -> float:
+    """Return log10 of the chance that a feature separates labels shuffled within each case."""
+    groups = [[e.is_wrong for e in elements]] if is_of_cases else [*_labels(elements).values()]
+    return -sum(log10(comb(len(group), sum(group))) for group in groups)
+
+
+def _predicates(elements: Sequence[Element], wrong: BoolArray) -> Iterator[Predicate]:
+    """Yield each feature that some elements have and some lack, and its negation; then bounds."""
+    shared = [n for n in elements[0].features if all(n in e.features for e in elements)]
+    for name in shared:
+        column = np.array([element.features[name] for element in elements])
+        if column.dtype != bool:
+            yield from _bounds(name, column, wrong)
+        elif 0 < column.sum() < len(column):
+            yield Predicate(words_of("feature", name), False, column)
+            yield Predicate(words_of("feature", name), True, ~column)
+
+
+def _bounds(name: str, column: FloatArray, wrong: BoolArray) -> Iterator[Predicate]:
+    """Yield the bound that separates a number of wrong and right elements, if there is any."""
+    quantity = words_of("number", name)
+    for low, high, is_above in ((column[~wrong], column[wrong], True),
+                                (column[wrong], column[~wrong], False)):  # fmt: skip
+        # one value on a side is a feature of its own, not a bound
+        if low.max() < high.min() and len({*low}) > 1 and len({*high}) > 1:
+            bound = _round_between(float(low.max()), float(high.min()))
+            words = sentence(
+                "where {number} is above {bound:.3g}"
+                if is_above
+                else "where {number} is below {bound:.3g}",
+                number=quantity,
+                bound=bound,
+            )
+            yield Predicate(words, False, column > bound if is_above else column < bound)
+
+
+def _round_between(low: float, high: float) -> float:
+    middle = (low + high) / 2.0
+    rounded = (round(middle, digits) for digits in range(-3, 12))
+    return next((number for number in rounded if low < number < high), middle)
+
+
+def _exact_words(quantity: Sentence, exact: Sequence[Predicate], wrong: BoolArray) -> Sentence:
+    counts: dict[str, Any] = {"wrong": int(wrong.sum()), "right": int((~wrong).sum())}
+    first = exact[0]
+    words = sentence(
+        "Wrong everywhere but {place}: {quantity} ({wrong} wrong, {right} right)."
+        if first.is_negation
+        else "Wrong {place} and nowhere else: {quantity} ({wrong} wrong, {right} right).",
+        place=first.words,
+        quantity=quantity,
+        **counts,
+    )
+    alternatives = [_stated(predicate) for predicate in exact[1 : 1 + MAX_ALTERNATIVES]]
+    if not alternatives:
+        return words
+    return sentence(
+        "{statement} No case tells this from: {alternatives}.",
+        statement=words,
+        alternatives=joined(alternatives),
+    )
+
+
+def _stated(predicate: Predicate) -> Sentence:
+    if predicate.is_negation:
+        return sentence("everywhere but {place}", place=predicate.words)
+    return predicate.words
+
+
+def _one_sided(
+    quantity: Sentence, predicate: Predicate, wrong: BoolArray, elements: Sequence[Element]
+) -> tuple[float, Sentence] | None:
+    """Return a weight and the words if all wrong elements have a feature, or all with it are wrong.
+
+    Few elements may be exceptions.
+    """
+    mask = predicate.mask
+    hits, others = int((mask & wrong).sum()), int((mask & ~wrong).sum())
+    remaining, missed = int((~mask).sum()), int((~mask & wrong).sum())
+    right = int((~wrong).sum())
+    values: dict[str, Any] = {"place": _stated(predicate), "quantity": quantity, "count": hits}
+    if not missed and others <= MAX_EXCEPTIONS * right:
+        words = sentence(
+            "All {count} wrong ones are {place}, and {others} of the {right} right ones: "
+            "{quantity}.",
+            others=others,
+            right=right,
+            **values,
+        )
+        return 1.0 - others / right, words
+    cases = {e.case for e, is_hit in zip(elements, mask & wrong, strict=True) if is_hit}
+    is_common = hits >= MAX_EXCEPTIONS * wrong.sum() and len(cases) >= MIN_CASES
+    if not others and is_common and missed <= MAX_EXCEPTIONS * remaining:
+        words = sentence(
+            "All {count} {place} are wrong; elsewhere {missed} of {remaining}: {quantity}.",
+            missed=missed,
+            remaining=remaining,
+            **values,
+        )
+        return hits / float(wrong.sum()), words
+    return None
+
+
+def joined(parts: Sequence[Sentence]) -> Sentence:
+    """Return sentences as a list."""
+    words = parts[0]
+    for part in parts[1:]:
+        words = sentence("{first}; {second}", first=words, second=part)
+    return words
