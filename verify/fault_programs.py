@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from itertools import chain, product
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,9 +27,9 @@ _TABLE = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
 
 
 def _in_forms(name: str, entry: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the program of an entry, or a program of each combination of its forms."""
+    """Yield the program of an entry, or that of each of its forms: a text for each of its texts."""
     forms = entry.get("forms", {})
-    for number, texts in enumerate(product(*forms.values()), 1):
+    for number, texts in enumerate(zip(*forms.values(), strict=True) if forms else [()], 1):
         replaced = (*entry.get("replaced", ()), *zip(forms, texts, strict=True))
         yield f"{name} {number}" if forms else name, {**entry, "replaced": replaced}
 

@@ -5,6 +5,7 @@ opposite to another or with equal components, where honest programs branch diffe
 """
 
 from collections.abc import Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,8 +24,8 @@ TASKS = {(FK, ""): "forward kinematics", (IK, "ccd"): "ccd", (IK, "fabrik"): "fa
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
 # Parents, effector and target of each: a tree with an inner effector, and a chain.
 SKELETONS = (
-    ([-1, 0, 1, 2, 1, 4, 0], 2, (0.9, -1.3, 0.8)),
-    ([-1, 0, 1, 2, 3], 4, (-0.7, 1.1, 1.6)),
+    ([-1, 0, 1, 2, 1], 2, (0.9, -1.3, 0.8)),
+    ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6)),
 )
 # The outputs that have keys, in their order: what poses have, and what the path has alone.
 OUTPUTS = {FK: ("positions", "rotations"), IK: ("local_rotations", "path")}
@@ -85,6 +86,7 @@ def _key(output: FloatArray | None, right: FloatArray | None) -> float:
     return float(fractions(difference.size, 5) @ difference)
 
 
+@cache
 def fractions(count: int, start: int) -> FloatArray:
     """Return numbers spread over (-1, 1): the fractions of multiples of sqrt(2) and sqrt(3)."""
     k = np.arange(1, count + 1) + 100.0 * start

@@ -14,6 +14,7 @@ from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..greeting import Step
 from ..kinematics.sweeps import PoseTrial
+from ..kinematics.textbook import SOLVERS as METHODS
 from ..task import BUILDS_ON, TASKS
 from .mutants import Program
 
@@ -23,6 +24,8 @@ FAULTS = _TABLE["line"]
 BY_LINES = {*FAULTS, *_TABLE["known"]}
 # Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
+# The declaration of programs of Jacobian methods.
+JACOBIAN = '"methods": ["jacobian"]'
 # Faults of these families are named in other ways than by the lines of a program.
 SELF_NAMED = ("LINE", "STATE")
 
@@ -45,8 +48,13 @@ def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
 
 
 def is_of(program: str, task: str, method: str) -> bool:
-    """Return whether a right program has a task, and a method of it."""
-    return bool(PROGRAMS[program]["task"] == task) and f"def {method}" in source_of(program)
+    """Return whether a right program has a task, and a method of it.
+
+    A Jacobian method has a name of its solver's own; the program's stands in its declaration.
+    """
+    source = source_of(program)
+    is_own = method not in ("", *METHODS) and JACOBIAN in source
+    return bool(PROGRAMS[program]["task"] == task) and (f"def {method}" in source or is_own)
 
 
 def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
