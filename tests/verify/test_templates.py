@@ -119,7 +119,8 @@ def build(language, folder, edit=str):
         (folder / name).write_text(edit(text), encoding="utf-8")
     make, run = map(shlex.split, (LANGUAGES[language].build, LANGUAGES[language].run))
     for tool in (one[0] for one in (make, run) if one and not one[0].startswith("./")):
-        version = [shutil.which(tool) or "false", "--version"]
+        question = "version" if tool == "go" else "--version"
+        version = [shutil.which(tool) or "false", question]
         if subprocess.run(version, capture_output=True, check=False).returncode:
             pytest.skip(f"{tool} does not start here: the {language} starter was not built")
     if make:
