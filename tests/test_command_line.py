@@ -298,7 +298,9 @@ def test_files_are_checked_and_counted(capsys, robots):
     assert re.search(
         r"^robots/c.xml \(MJCF\): .*\n  Pinocchio: not read by us: c.xml, li", out, re.M
     )
-    assert "Of 3 files nothing disagrees; 1 is a part that others include, 1 XML file is of" in out
+    assert (
+        "In 3 files no reading disagrees; 1 is a part that others include, 1 XML file is of" in out
+    )
     assert re.search(r"^MJCF +Pinocchio +2 +1 +0 +1 ", out, re.MULTILINE)
 
 

@@ -86,4 +86,4 @@ def test_a_file_without_end_is_refused_in_a_sentence(done, line):
 def test_a_model_file_of_many_gigabytes_is_counted_as_not_read(done):
     code, output, _ = done[COUNTED]
     assert code == 0
-    assert "Of 1 files nothing disagrees" in output
+    assert "In 1 file no reading disagrees" in output

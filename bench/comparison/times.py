@@ -19,9 +19,9 @@ Floats = NDArray[np.float64]
 
 # The probability of calling any row faster or slower although no row is, as usual.
 ERROR_RATE = 0.05
-# Of intervals, as in every table.
+# The confidence of intervals, as in every table.
 CONFIDENCE = 0.95
-# Of a bootstrap: the standard deviation of 200 is known to 5 %, 1 / sqrt(2 * 199).
+# The size of a bootstrap: the standard deviation of 200 is known to 5 %, 1 / sqrt(2 * 199).
 RESAMPLES = 200
 # The least drift, however steady the machine seems. A round number: a smaller change is no news.
 FLOOR = 0.01

@@ -173,8 +173,8 @@ def _summary(records: Sequence[Record]) -> Summary:
         sum(int((p.coverage == value).sum()) for p in proofs) for value in (COVERED, IMPOSSIBLE)
     )
     return Summary(
-        f"Of {counted(total, 'target')} {words(covered)} are proven to have an exact solution near "
-        f"the answer and {words(impossible)} to have none, {words(total - covered - impossible)} "
+        f"{words(covered)} of {counted(total, 'target')} are proven to have an exact solution near "
+        f"the answer, {words(impossible)} to have none, {words(total - covered - impossible)} "
         f"are open; {words(refuted)} proofs are refuted."
     )
 

@@ -227,8 +227,8 @@ def _summary(records: Sequence[Record]) -> Summary:
         f"{counted(len(newton), 'cloth')}. "
     )
     return Summary(
-        f"{first if newton else ''}Of the other solvers’ "
-        f"{counted(len(rivals), 'solution')}, {words(len(distances))} are proven to belong to the "
+        f"{first if newton else ''}{words(len(distances))} of "
+        f"{counted(len(rivals), 'solution')} by other solvers are proven to belong to the "
         f"same minimiser{nearby}."
     )
 

@@ -50,7 +50,7 @@ class FabrikSolves(FabrikWords, frozen=True):
 
     iterations: Floats1
     residual: Floats1
-    # Of a user's solver also the other numbers of `ChainSolves`.
+    # A user's solver has the other numbers of `ChainSolves` too.
     distance: Floats1 | None = None
     bend: Floats1 | None = None
     excess: Floats1 | None = None

@@ -286,7 +286,7 @@ def _own_times(job: RobotJob, outcome: JobOutcome) -> Times:
 def _measured(job: RobotJob, outcome: JobOutcome, times: Times | None) -> Measured:
     """Return the numbers of answers and times.
 
-    Of targets never begun there is nothing, and the solver did not finish.
+    Targets never begun have no numbers; their solver did not finish.
     """
     evaluator, engine = evaluator_of(job.robot), arbiter_of(job.peer.built_on)
     robot = evaluator.robot
@@ -798,7 +798,7 @@ def _outcome_summary(rows: Sequence[Score]) -> Summary:
     counts = sum((score.outcomes for score in rows), Counter())
     unsolved = Counter({name: counts[name] for name in OUTCOMES[1:]})
     name, count = unsolved.most_common(1)[0]
-    sentence = f"Of {words(unsolved.total())} unsolved targets {words(count)} count as “{name}”."
+    sentence = f"{words(count)} of {words(unsolved.total())} unsolved targets count as “{name}”."
     return listing(sentence, points)
 
 

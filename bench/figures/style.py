@@ -8,7 +8,7 @@ from plumbob.text.printable import shortened
 
 _STYLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 COLOURS: dict[str, str] = _STYLE["colours"]
-# Of matplotlib, for all figures.
+# Parameters of matplotlib for all figures.
 PARAMETERS: dict[Any, Any] = {
     name: COLOURS.get(str(value), value) for name, value in _STYLE["parameters"].items()
 }

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from ..problems.own import OwnProblem
 
 
-# Of random targets, unless the user asks for others.
+# The seed of random targets, unless the user sets another.
 SEED = 1986
 # The result of a block: numbers and words by name, of the type that the experiment declares.
 Measured = Mapping[str, Any]

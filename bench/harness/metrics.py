@@ -58,8 +58,8 @@ class Timing(NamedTuple):
 # The share of samples in which a statement holds, over all comparisons of a ranking at once; the
 # usual share.
 CONFIDENCE = 0.95
-# Of a bootstrap: each end of an interval of 95 % then leaves out 2.5 % of the samples, give or take
-# 0.8 %, sqrt(0.025 * 0.975 / 400).
+# The size of a bootstrap: each end of an interval of 95 % leaves out 2.5 % of the samples, give or
+# take 0.8 %, sqrt(0.025 * 0.975 / 400).
 RESAMPLES, _SEED = 400, 1979
 # More targets take the normal distribution instead, which a mean of so many times follows.
 LARGE = 20_000

@@ -28,7 +28,7 @@ class Run:
     settings: Mapping[str, Any] = field(default_factory=dict)  # of the adapter
     note: str = ""  # tells it from another run of the same solver and kind
     restarts: int = 0  # further attempts from random poses, for solvers without restarts
-    # Of cloths: the name in records, the iterations of one step, steps of a frame of a motion and
+    # For cloths: the name in records, the iterations of one step, steps of a frame of a motion and
     # iterations of each, and whether the solver solves a step to the end.
     title: str = ""
     ladder: tuple[int, ...] = ()

@@ -19,7 +19,7 @@ CURVE = "curve"
 FRAMES = {"circle": 150, "square": 150, "heart": 150, "triangle": 150, "star": 400}
 CUSTOM = "plumb_bob"
 CUSTOM_SAMPLES = 1200
-# Of neighbouring samples [m].
+# Distances of neighbouring samples [m].
 MIN_SPACING, MAX_SPACING = 0.01, 0.02
 # Distances of targets out of reach, over the reach: from nearly straight to far.
 BEYOND = (1.01, 2.0)

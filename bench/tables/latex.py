@@ -1,4 +1,4 @@
-"""A table as LaTeX: rules of booktabs, numbers aligned by siunitx, every text as data for TeX.
+"""A table as LaTeX: rules of booktabs, numbers aligned by siunitx, texts escaped.
 
 The cells are the same as in Markdown. Widths, fonts and page breaks are set by the paper.
 """

@@ -26,7 +26,7 @@ Product = TypeVar("Product")
 
 
 class Results:
-    """The current records that hold numbers, with printable words, in the order of the file.
+    """The current records of a folder in the order of the file, without unprintable characters.
 
     Attributes:
         every: all records.

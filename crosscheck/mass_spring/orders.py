@@ -16,7 +16,7 @@ from .integrators import SIMULATORS, mechanical_energy
 
 # Steps of the coarser of two runs.
 STEPS = 40
-# Of the accurate solution: at order 4 its error is 8**-4 of the error in as many steps.
+# Refinement of the accurate solution: at order 4 its error is 8**-4 of the error in as many steps.
 REFINEMENT = 8
 
 

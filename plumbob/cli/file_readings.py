@@ -112,10 +112,11 @@ def _sentence(scan: FileSelection, checked: Sequence[CheckedFile], disagreements
     outcomes = ({reading.outcome for reading in file.readings} for file in checked)
     unread = sum(outcome == {files.NEITHER} for outcome in outcomes)
     silent = f", {counted(unread, 'is', 'are')} read by none" if unread else ""
-    differ = counted(disagreements, "reading disagrees", "readings disagree")
+    differ = counted(disagreements, "reading", "readings") if disagreements else "no reading"
+    verb = "disagrees" if disagreements < 2 else "disagree"
+    total = counted(len(checked) - fragments, "file", "files")
     parts = counted(fragments, "is a part", "are parts")
     ignored = counted(scan.ignored, "XML file is", "XML files are")
     return (
-        f"Of {len(checked) - fragments:,} files {differ if disagreements else 'nothing disagrees'}"
-        f"{silent}; {parts} that others include, {ignored} of other kinds"
+        f"In {total} {differ} {verb}{silent}; {parts} that others include, {ignored} of other kinds"
     )

@@ -128,7 +128,7 @@ def _kill(kill: Callable[[int, int], None], target: int) -> None:
 
 
 def guard(leader: int, marker: int) -> subprocess.Popen[bytes]:
-    """Start a process that kills the same when this process ends, for whatever reason."""
+    """Start a guard that kills the same group and descendants as soon as this process ends."""
     return subprocess.Popen(
         ["/bin/sh", "-c", _GUARD, "sh", str(leader), str(marker)],
         stdin=subprocess.PIPE,

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Callable, Iterable, Mapping
 from typing import NamedTuple
 
-# Of a longer name only the beginning is compared [characters].
+# Compare only the beginning of longer names [characters].
 _LONGEST_NAME = 100
 
 

@@ -37,7 +37,7 @@ LINE = re.compile(r"\S[^\n]*")
 BRACES = re.compile(r"([{}])")
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 CYCLIC = ("XYZ", "YZX", "ZXY")
-# Of lengths [m] and angles [degrees]: half the last digit moves the end of a metre by 9 nm.
+# Decimals of lengths [m] and angles [degrees]: rounding moves the end of a metre by 9 nm.
 DECIMALS = 6
 POSITIONS = "Xposition Yposition Zposition"
 # Deeper joints are not indented further: the text of a long chain stays linear in its length.

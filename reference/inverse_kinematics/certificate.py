@@ -9,8 +9,8 @@ With a = 1 - |I - J B| > 0 (Kantorovich 1948)
     r = 2 |F(p)| / (a + sqrt(a² - 2 L |B|² |F(p)|)).
 
 Joint i moves by at most |B_i| r, which must stay within its limits. docs/certificates.md has the
-proof, the constant L, and the rounding errors of forward kinematics. A pose that no configuration
-reaches is proven by `reach`.
+proof, the constant L, and the rounding errors of forward kinematics. `reach` proves that no
+configuration reaches a target.
 """
 
 import math

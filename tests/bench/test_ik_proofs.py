@@ -50,7 +50,7 @@ def test_table_and_sentence_follow_the_records(make):
     assert row[:8] == ("Franka Panda", "anywhere", 50.0, 50.0, 50.0, 25.0, 25.0, 0)
     assert row[8:11] == (2.0, 5.0, 0.5)
     sentence = table.summary.sentence
-    assert "Of 4 targets 2 are proven" in sentence
+    assert "2 of 4 targets are proven" in sentence
     assert "1 to have none, 1 are open; 0 proofs are refuted" in sentence
     refuted = record.with_measured(refuted=[True, False] * 2)
     assert "2 proofs are refuted" in ik_proofs.pose_proofs(Results([refuted])).summary.sentence

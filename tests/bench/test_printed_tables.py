@@ -171,7 +171,7 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
         "robots/b.xml (MJCF): Pinocchio differs (0.500); MuJoCo agrees (3.0e-15)",
         "robots/walk.bvh (BVH): second reader agrees (4.0e-14)",
     ]
-    about = "Of 3 files 1 reading disagrees; 1 is a part that others include, 1 XML file is of "
+    about = "In 3 files 1 reading disagrees; 1 is a part that others include, 1 XML file is of "
     headings = ["format", "compared with", "files"]
     headings += ["agrees", "differs", "not read", "agrees within"]
     rows = [

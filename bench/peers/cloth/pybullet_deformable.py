@@ -178,9 +178,10 @@ def mesh(system: MassSpring) -> tuple[FloatArray, IndexArray]:
 
 
 def _triangles(size: int) -> IndexArray:
-    """Return two triangles of each square, triangles over two edges in a row, a last diagonal.
+    """Return the corners of triangles, whose edges become springs, (triangle, 3).
 
-    No three corners are in line, and all are joined: PyBullet loads other meshes without end.
+    There are two triangles for each square of particles, triangles over two edges in a row, and one
+    for the last diagonal. PyBullet never finishes loading a mesh with flat or loose triangles.
     """
     at = np.arange(size**2).reshape(size, size)
     a, b, c, d = at[:-1, :-1], at[1:, :-1], at[1:, 1:], at[:-1, 1:]
