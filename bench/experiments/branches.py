@@ -200,7 +200,7 @@ COLUMNS = (
     text("remark", lambda record: record.values.remark),
     *folded(
         Column("targets", read=of_numbers(lambda lists: len(lists.solutions))),
-        Column("targets with missing ones", read=of_numbers(lambda r: (r.missing > 0).sum())),
+        Column("targets with missing solutions", read=of_numbers(lambda r: (r.missing > 0).sum())),
         Column("singular targets", read=of_numbers(lambda lists: lists.singular)),
     ),
 )

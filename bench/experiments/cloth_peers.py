@@ -899,7 +899,7 @@ motion = CAPTIONS.layout(
     columns=_columns(
         MOTION_TARGETS,
         "%",
-        Column("stable up to", "2/ω", read=lambda row: row.limit and row.limit.relative),
+        Column("stability limit", "2/ω", read=lambda row: row.limit and row.limit.relative),
         Column("longest stable step", "ms", read=lambda row: row.limit and number(row.limit.step)),
         Column("2 / ω", "ms", read=lambda row: row.limit and row.limit.theory),
     ),

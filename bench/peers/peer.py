@@ -74,7 +74,7 @@ class Peer:
     colour: str = ""  # its colour in figures, by its name in `bench.figures.style`; "" for any
     # the engine whose kinematics it works with, which never evaluates its answers
     built_on: str = ""
-    use: str = ""  # the reason to choose this peer, which ends the sentence "choose it for"
+    use: str = ""  # the reason to choose this peer, for the column "best use"
     precision: str = ""  # the precision of its kinematics, if not double
     is_loop: bool = False  # whether it is a Python loop of ours on the package's kinematics
     environment: str = ""  # an environment of its own with its own Python; "" for a solver in ours

@@ -32,7 +32,7 @@ def solvers_on_robot(results: Results, name: str) -> Table:
         Column("solved", "%", read=lambda score: score.share.hits / score.share.total),
         Column("median", "µs", read=_median),
         Column("95 %", "µs", read=lambda score: metrics.spread(score.seconds).p95),
-        text("choose it for", lambda score: _peers().get(score.solver, ("", ""))[1]),
+        text("best use", lambda score: _peers().get(score.solver, ("", ""))[1]),
         replace(text("settings", lambda score: score.solver), folded=True),
     )
     details = rows[0].records[0].values

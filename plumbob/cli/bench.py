@@ -55,9 +55,9 @@ Solvers = Annotated[Texts, option("NAME", "Measure only this solver; repeatable.
 Problems = Annotated[Texts, option("NAME", "Only this problem, or your .py, model or folder.")]
 Robots = Annotated[Texts, option("NAME", "Measure only this robot; repeatable.")]
 Targets = Annotated[
-    int | None, option("N", "Targets per problem; of robots 1/20 of each kind.", min=1)
+    int | None, option("N", "Targets per problem; 1/20 per kind for robots.", min=1)
 ]
-Seed = Annotated[int | None, option("N", "Seed of other random targets in suite ik.", min=0)]
+Seed = Annotated[int | None, option("N", "Seed of the random targets in suite ik.", min=0)]
 Seeds = Annotated[int, option("N", "Draw targets of robots from N seeds.", min=1)]
 Effector = Annotated[Text, option("NAME", "Link of your models that must reach the target.")]
 Listing = Annotated[bool, flag("List problems and solvers, and stop.", "--list")]

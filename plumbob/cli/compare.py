@@ -63,9 +63,9 @@ def compare(  # noqa: PLR0913 -- one parameter an option
     """Compare two runs or revisions: faster, slower, more or less accurate.
 
     Answers are compared bit by bit, times by confidence intervals. Differences within the drift of
-    the machine are undecided; --rerun REV decides them. Exit code 1 if a row fails --fail, as do
-    rows that are gone or have failed, unless it says gone:any. With --with, the solver is yours,
-    and so is the repository; limits are set unless --fail sets others.
+    the machine are undecided; --rerun REV decides them. Exit code 1 if a row exceeds a limit of
+    --fail. Rows that are gone or have failed exceed every limit, except with gone:any. With --with,
+    REV is a revision of your own repository, and --fail has default limits.
     """
     from plumbob.bench.comparison import compare as comparison
     from plumbob.bench.tables.writers import markdown as as_markdown

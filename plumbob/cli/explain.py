@@ -13,7 +13,7 @@ def explain(
 ) -> int:
     """Explain a fault that verify names: cause, remedy, wrong and right lines, symptom.
 
-    With words: list the faults that have all of them. Without: list the families of faults.
+    Given words, list the faults that contain every word. Without an argument, list the families.
     """
     from plumbob.text.language import language_of
     from plumbob.verify.screen.fault_text import fault_help

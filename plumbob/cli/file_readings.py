@@ -74,7 +74,7 @@ def _summary(groups: Sequence[FileGroup], outcomes: set[str], summary: Summary) 
         text("compared with", lambda group: group.engine),
         Column("files", read=lambda group: len(group.readings)),
         *(Column(o, read=partial(count, o)) for o in OUTCOMES if o in {AGREES, DIFFERS, *outcomes}),
-        Column("agrees within", read=_largest_difference),
+        Column("largest difference", read=_largest_difference),
     )
     title = "Who reads and who agrees"
     return Table("summary", title, columns, cells(columns, groups), summary=summary)

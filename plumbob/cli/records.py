@@ -59,7 +59,7 @@ def merge(
     folders: Annotated[list[Path], argument("FOLDER...", "Folders to take records from.")],
     into: Annotated[Path, option("DIR", "Folder to add to.", "--into")],
 ) -> int:
-    """Add the records of folders to another; of repeated measurements, the latest counts.
+    """Add the records of folders to another; the latest of repeated measurements counts.
 
     A failed measurement never replaces a successful one. The folders are not changed.
     """
@@ -100,7 +100,7 @@ def drop(
         bool, flag("Print the number of records, and keep them.", "--dry-run")
     ] = False,
 ) -> int:
-    """Remove the records that match all options, for good."""
+    """Delete the records that match all options, permanently."""
     from plumbob.bench.harness.folder_lock import locked
     from plumbob.bench.harness.record import RecordFile
 

@@ -61,6 +61,6 @@ def test_the_table_adds_up_the_targets(make):
     assert column(table, "missing") == [1, None]
     assert column(table, "false") == [2, None]
     assert column(table, "remark") == ["", "takes no arm"]
-    assert column(table, "targets with missing ones") == [1, None]
+    assert column(table, "targets with missing solutions") == [1, None]
     assert table.summary.sentence == "Plumbob lists 11 of 12 solutions."
     assert table.summary.points == ("Plumbob: 1 missing, 2 false; UR5 20.0 µs",)

@@ -608,7 +608,7 @@ def test_a_missing_engine_has_a_row_in_both_tables(make):
 def test_a_limit_of_stability_stands_beside_the_motions_in_units_of_the_theory(make):
     records = [make.bounded("a", 0.02), make.bounded("b", np.nan), make.fell("a"), make.fell("b")]
     table = peers_cloth.motion(Results(records))
-    assert column(table, "stable up to [2/ω]") == [pytest.approx(1.0), None]
+    assert column(table, "stability limit [2/ω]") == [pytest.approx(1.0), None]
     assert column(table, "longest stable step [ms]")[0] == 20.0
 
 

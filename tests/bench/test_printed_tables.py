@@ -173,7 +173,7 @@ def test_files_are_listed_with_what_each_engine_reads(capsys, tmp_path, monkeypa
     ]
     about = "In 3 files 1 reading disagrees; 1 is a part that others include, 1 XML file is of "
     headings = ["format", "compared with", "files"]
-    headings += ["agrees", "differs", "not read", "agrees within"]
+    headings += ["agrees", "differs", "not read", "largest difference"]
     rows = [
         ["URDF", "Pinocchio", "1", "0", "0", "1", "–"],
         ["URDF", "MuJoCo", "1", "1", "0", "0", "2.0e-16"],

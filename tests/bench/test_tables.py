@@ -207,7 +207,7 @@ LEFT_EMPTY = {
         for count in ("10", "100", "1,000")
     ),
     *(f"left after {count} steps" for count in ("100", "1,000", "10,000")),
-    *("time to 1 %", "setting for 1 %", "longest stable step", "stable up to", "2 / ω"),
+    *("time to 1 %", "setting for 1 %", "longest stable step", "stability limit", "2 / ω"),
 }
 
 
