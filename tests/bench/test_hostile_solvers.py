@@ -1,8 +1,7 @@
-"""What a hostile solver gets, whatever it does and whichever way it comes in; nothing stays.
+"""What a hostile Python file gets from `verify` and from the bench; nothing of it stays.
 
-Ways in: a Python file, a program, files of answers, and the bench, which takes the Python file.
-Elsewhere: what programs do to pipes and how they leave (`test_hostile_programs`), lines that take
-long to read (`test_message`), processes that leave their session (`test_processes`).
+Elsewhere: programs (`test_hostile_programs`), answers that are none (`test_message`), files of
+answers (`test_doors_files`), and what a Python file does by mistake (`test_doors_python`).
 """
 
 import json
@@ -29,11 +28,8 @@ from plumbob.reference import Skeleton
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer
-from plumbob.verify.door import export, open_contestant
-from plumbob.verify.greeting import Greeting
-from plumbob.verify.message import NO_SECONDS
+from plumbob.verify.door import open_contestant
 
-NOT_TIMED = sentence('Not timed: the answers hold no valid "seconds".')
 TASK = "inverse_kinematics"
 TARGETS = np.array([[0.0, 2.0, 1.0], [0.0, 1.0, 2.0]])
 POSE = [[1.0, 0.0, 0.0, 0.0]] * 3
@@ -53,41 +49,26 @@ import numpy as np
 def inverse_kinematics(**request):
     return misbehave(request) if request["max_iterations"] == 9 else right(request)
 """
-PROGRAM = """
-for line in sys.stdin:
-    request = json.loads(line)
-    if request["task"] == "greeting":
-        fields = {"protocol": 1, "tasks": ["inverse_kinematics"]}
-    else:
-        fields = misbehave(request) if request["max_iterations"] == 9 else right(request)
-    print(json.dumps({"id": request["id"], **fields}), flush=True)
-"""
 
 
 class Behaviour(NamedTuple):
-    """What a solver does or answers, and the sentence by each way; None where it is not tried."""
+    """What a solver does or answers, and its sentence."""
 
     does: str | dict
     python: str
-    program: str | None = None
-    files: str | None = None
-    bench: str | None = ""  # "" for the sentence of the Python file
-    waits: bool = False
+    bench: str | None = ""  # "" for the sentence of `verify`, None where it is not tried
 
 
 SILENT = "ended after 1 s of silence"
 DEEP = json.loads("[" * 500 + "]" * 500)
 
 
-def behaviour(words=None, answer=None, pose=True, does="", bench="", **others):
+def behaviour(answer=None, pose=True, does="", bench="", **others):
     """Return an entry of the table."""
     if answer is not None:
         does = {"local_rotations": POSE} | answer if pose else answer
         if does.get("local_rotations") == "lists in lists":
             does["local_rotations"] = DEEP
-    if words is not None:
-        others |= {"python": words, "program": words}
-        others |= {"files": words} if answer is not None else {}
     return Behaviour(does, bench=None if bench is False else bench, **others)
 
 
@@ -108,71 +89,36 @@ def case(iterations):
 
 
 def outcome(answer):
-    """Return what came of a request in words: remarks, and why it is timed by round trips."""
-    if not isinstance(answer, Answer):
-        return f"{answer.kind}: {answer.sentence}"
-    is_usual = answer.untimed in (None, NO_SECONDS, NOT_TIMED)
-    untimed = None if is_usual else answer.untimed
-    return "; ".join(map(str, filter(None, ["answer", *answer.remarks, untimed])))
+    """Return what came of a request in words, with remarks."""
+    if isinstance(answer, Answer):
+        return "; ".join(map(str, ["answer", *answer.remarks]))
+    return f"{answer.kind}: {answer.sentence}"
 
 
 def rows(way, *quick):
-    """The rows of a way in; those that wait, and those that are not quick, are slow."""
-    return [
-        pytest.param(
-            name, marks=[pytest.mark.slow] * (row.waits or bool(quick and name not in quick))
-        )
-        for name, row in BEHAVIOURS.items()
-        if getattr(row, way) is not None
-    ]
+    """The rows of a way in, of which few are quick."""
+    names = [name for name, row in BEHAVIOURS.items() if getattr(row, way) is not None]
+    slow = pytest.mark.slow
+    return [pytest.param(name, marks=[slow] if name not in quick else []) for name in names]
 
 
-def opened(folder, way, row):
-    limits = LIMITS._replace(request=0.5 if row.python.startswith("^hung") else 20.0)
-    file = folder / "solver.py"
-    file.write_text(source(row.does, PYTHON if way == "python" else PROGRAM))
-    spec = str(file) if way == "python" else (sys.executable, "-I", "-S", str(file))
-    return open_contestant(spec, limits)
-
-
-PYTHON_QUICK = ("replaces the clock", "floods its output")
-
-
-def check_sentence(folder, way, name):
-    """What a hostile solver gets; the next request is answered, and nothing stays."""
-    solver, words = opened(folder, way, BEHAVIOURS[name]), getattr(BEHAVIOURS[name], way)
+@pytest.mark.parametrize("name", rows("python", "replaces the clock", "floods its output"))
+def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
+    """The next request is answered."""
+    row = BEHAVIOURS[name]
+    (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
+    patience = 0.5 if row.python.startswith("^hung") else 20.0
+    solver = open_contestant(str(tmp_path / "solver.py"), LIMITS._replace(request=patience))
     try:
         before, answer, after = (solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT))
     finally:
         solver.close()
     assert outcome(before) == outcome(after) == "answer"
-    assert not running(folder)
-    assert re.search(words, outcome(answer)), outcome(answer)
+    assert not running(tmp_path)
+    assert re.search(row.python, outcome(answer)), outcome(answer)
     remarks = map(str, solver.remarks)
     assert any("left processes running" in remark for remark in remarks) == ("child" in name)
-    assert way == "program" or not isinstance(answer, Answer) or answer.seconds > 0.0
-
-
-@pytest.mark.parametrize("name", rows("python", *PYTHON_QUICK))
-def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
-    check_sentence(tmp_path, "python", name)
-
-
-@pytest.mark.sample(every=4)
-@pytest.mark.parametrize("name", rows("program"))
-def test_a_hostile_program_gets_its_sentence(tmp_path, name):
-    check_sentence(tmp_path, "program", name)
-
-
-@pytest.mark.parametrize("name", rows("files"))
-def test_hostile_files_get_their_sentence(tmp_path, name):
-    row, asked = BEHAVIOURS[name], case(HOSTILE)
-    export.write_cases(tmp_path, [asked], Greeting(1, (TASK,)))
-    (request,) = tmp_path.rglob("request.json")
-    request.with_name("answer.json").write_text(json.dumps(row.does))
-    found = open_contestant(tmp_path).answer(asked)
-    assert re.search(row.files, outcome(found)), outcome(found)
-    assert not isinstance(found, Answer) or found.seconds == 0.0
+    assert not isinstance(answer, Answer) or answer.seconds > 0.0
 
 
 @pytest.fixture(scope="module")
