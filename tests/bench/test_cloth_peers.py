@@ -1,9 +1,6 @@
 """One cloth for every solver: adapters, errors, limits of stability, tables and figures."""
 
-import contextlib
 import importlib
-import subprocess
-import sys
 from functools import partial
 
 import numpy as np
@@ -450,36 +447,6 @@ def test_explicit_solvers_take_no_implicit_step_and_all_move():
         for key in ((1, 1e3), (2, 1e3))
     )
     assert first == second[::-1]
-
-
-@pytest.fixture
-def errors_of_all(monkeypatch):
-    """Return the errors of every installed peer on a tiny cloth in a fresh process, to the bit."""
-
-    def measured():
-        worker = WorkerProcess(600.0, 120.0)
-        monkeypatch.setattr(peers_cloth, "worker_process", lambda: worker)
-        with contextlib.closing(worker):
-            return {
-                (task, peer.title): peers_cloth.work(task, peer, [FALL])["error"].tobytes()
-                for task in (ONE_STEP, MOTION)
-                for peer in catalogue.cloth_peers()
-                if peer.is_installed and (task == MOTION or peer.run.kind != EXPLICIT)
-            }
-
-    return measured
-
-
-@pytest.mark.slow
-def test_a_busy_machine_changes_no_error(errors_of_all):
-    """PyBullet keeps its body in a process, and with it some rounding from run to run."""
-    quiet = errors_of_all()
-    loop = [sys.executable, "-c", "while True: pass"]
-    with contextlib.ExitStack() as stack:
-        for _ in range(2):
-            process = stack.enter_context(subprocess.Popen(loop))
-            stack.callback(process.kill)
-        assert errors_of_all() == quiet
 
 
 def test_a_missing_peer_costs_one_block_that_says_so(monkeypatch):

@@ -124,15 +124,6 @@ def test_our_loop_on_an_engine_and_our_other_solvers_are_nobodys_rivals(run):
     assert not any(loop in win for win in wins(ahead))
 
 
-def test_a_solver_cut_short_is_not_ranked(run):
-    cut = run("slow", 3, seconds=[1.0, 1.0, 1.0])
-    records = [run("a", 150), run("b", 20), cut]
-    for question in (MOST, FASTEST):
-        assert "slow" not in sentence(records, question)
-        assert sentence(records, question).startswith("On the arm, from one start, a solves ")
-    assert headlines.headlines(Results([records[0], cut])) == []
-
-
 def test_solvers_are_compared_where_most_pairs_of_robot_and_solver_are(run):
     records = [run(s, 150, robot=r) for s in ("a", "b") for r in ("arm", "ur5", "hand")]
     ours = [r for r in records if r.problem != "robots/ur5"]
@@ -266,14 +257,6 @@ def median_of(table):
     return next(column for column in table.columns if column.title == "median")
 
 
-def test_nobody_leads_among_those_that_were_timed_apart(make):
-    rounds = np.linspace(1e-6, 1.1e-6, 27).reshape(9, 3)
-    records = [in_sweeps(make, s, f * rounds) for s, f in (("Pinocchio", 1), ("MuJoCo", 9))]
-    apart = [r.with_measured(together=r.solver) for r in records]
-    assert "Pinocchio is the fastest" in sentence(records, KINEMATICS)
-    assert sentence(apart, KINEMATICS) == NOBODY
-
-
 def test_without_rivals_there_is_no_headline(make):
     """Plain Python, the memory bound and loops of ours on engines are no rivals of Plumbob."""
     names = (catalogue.PLAIN.name, catalogue.LIMIT_NAME, "Plumbob, compiled")
@@ -301,19 +284,6 @@ def test_an_engine_races_at_its_default_tolerance(make):
     first = records[2].with_measured(seconds=0.1 * rounds)
     assert sentence([*records[:2], first], "Fastest in a step of a cloth") == sentence(
         records, "Fastest in a step of a cloth"
-    )
-
-
-def test_a_motion_is_a_race_of_its_own(make):
-    near = {"error": [np.inf, 5e-3, 1e-3]}
-    records = [
-        make.fell("Newton engine, semi-implicit", seconds=[1e-4, 2e-4, 1.0], **near),
-        make.fell("Plumbob symplectic Euler", **near),
-    ]
-    assert sentence(records, "Fastest in a motion within 1 % of the truth") == (
-        "In a motion within 1 % of the truth, Newton engine is the fastest on 1 of 1 cloth, "
-        "5.0 times faster than the best other engine, Plumbob (ours); each runs on one core, "
-        "Newton engine in single precision."
     )
 
 
@@ -384,13 +354,6 @@ def test_the_scale_gives_the_number_of_targets_if_there_are_records(make, run):
     quick = make.record(FINISHED, "ik", "", notes={"scale": "quick"})
     scale = headlines.scale(Results([quick, run("a", 1)]))
     assert scale == "Quick run: 100 targets of each kind"
-
-
-def test_the_faster_of_two_comes_first_with_the_ratio_and_its_interval_inverted():
-    ratio = metrics.Interval(0.5, 0.4, 0.8)
-    first, second, inverted = headlines._in_order("a", "b", ratio)
-    assert (first, second, inverted) == ("b", "a", (2.0, 1.25, 2.5))
-    assert headlines._in_order("b", "a", inverted) == ("b", "a", inverted)
 
 
 def test_a_paired_ratio_holds_the_factor_and_a_single_pair_leaves_it_open():

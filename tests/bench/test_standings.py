@@ -80,12 +80,6 @@ def test_a_slow_solver_is_ranked_on_the_targets_that_it_was_given(make):
     assert other.sentence.startswith("Other ranks 2 of 3 (1 solver not ranked): it solves 75 %")
 
 
-def test_a_rank_is_among_those_that_finished(make):
-    rivals = [make.solving("pink", 100), make.solving("mink", 18, begun=18)]
-    standing = only([*rivals, make.solving("Mine", 20, mine=True)])
-    assert standing.sentence.startswith("Mine ranks 2 of 2 (1 solver not ranked): it solves ")
-
-
 def chained(make, solver, residuals, seconds, stratum="near", mine=False):
     """A record of the chain, its targets within 1e-4 m solved."""
     made = make.reached(stratum, solver)

@@ -114,14 +114,6 @@ def test_a_cloth_solver_of_fifteen_lines_stands_in_tables_and_figures(folder):
     np.testing.assert_allclose(ours.measured["error"], theirs.measured["error"], rtol=1e-6)
 
 
-@pytest.mark.slow
-def test_a_cloth_solver_has_the_limit_of_its_method(folder):
-    asked = ("--problem", "peers/stability", *EXPLICIT)
-    assert bench("cloth", "--quick", *asked, "--with", "my_cloth.py") == 0
-    limits = [one.measured["limit"] for one in records() if one.problem == "peers/stability"]
-    np.testing.assert_allclose(*limits, rtol=1e-3)
-
-
 def test_a_slow_solver_gets_the_first_targets_and_a_rank_on_these(
     folder, capsys, monkeypatch, in_this_process
 ):
@@ -213,29 +205,6 @@ def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, re
     (record,) = records("My program")
     assert remark in record.measured["remark"]
     assert (record.measured["seconds"] < 1e-6).all() == bool(extra)
-
-
-# What else is broken is refused with its sentence: see `test_hostile_solvers`.
-BROKEN = {
-    "crashes": "import os; os.abort()",
-    "stretches": 'return {"positions": 2.0 * offsets.cumsum(axis=0)}',
-}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", BROKEN)
-def test_a_broken_solver_loses_its_own_rows_only_and_says_why(folder, name, capsys):
-    head = "def inverse_kinematics(offsets, local_rotations):\n    "
-    (folder / "broken.py").write_text(head + BROKEN[name] + "\n", encoding="utf-8")
-    bench("ik", *SMALL, "--with", "broken.py", "--solver", "broken.py", "--solver", "ccd",
-          "--with", "my_ik.py", "--solver", "My FABRIK")  # fmt: skip
-    (theirs,) = records("broken.py")
-    assert theirs.failed or theirs.measured["remark"]
-    assert theirs.failed or np.isinf(theirs.measured["residual"]).all()
-    for other in ("ccd", "My FABRIK"):
-        (record,) = records(other)
-        assert (record.measured["residual"] <= 1e-4).all()
-    assert tables(Results(records()), ["ik"])
 
 
 def entrants(*words):
@@ -409,18 +378,6 @@ def test_problems_of_a_python_file_stand_in_the_same_tables(folder, capsys):
     capsys.readouterr()
     assert bench("ik", "--quick", *words, "--dry-run") == 0
     assert "tentacle is another problem now" in " ".join(capsys.readouterr().out.split())
-
-
-@pytest.mark.slow
-def test_a_cloth_of_a_python_file_stands_in_the_same_tables(folder):
-    (folder / "my_problems.py").write_text(PROBLEMS, encoding="utf-8")
-    words = ("--problem", "my_problems.py", "--with", "my_cloth.py", "--solver")
-    assert (
-        bench("cloth", "--quick", *words, "My symplectic Euler", "--solver", "Plumbob Newton") == 0
-    )
-    rows = [row[:2] for row in made("cloth")["cloth_peers_motion"].rows]
-    assert set(rows) == {("hammock", "My symplectic Euler"), ("hammock", "Plumbob Newton")}
-    assert "hammock" in drawn(truth_chart(Results(records()))).svg
 
 
 URDF = """<robot name="r"><link name="b"/><link name="l1"/><link name="l2"/><link name="t"/>

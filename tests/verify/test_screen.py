@@ -13,7 +13,6 @@ from rich.cells import cell_len
 from small_discipline import SMALL, own_rotation
 
 from plumbob.reference import Skeleton, forward_kinematics
-from plumbob.text.language import translator
 from plumbob.text.sentence import Sentence, sentence, with_code
 from plumbob.verify import verify
 from plumbob.verify.case import Case
@@ -193,13 +192,6 @@ def test_numbers_side_by_side_are_whole():
         row = comparison.rows(one)[0]
         assert all(number in text for side in comparison.texts(row) for number in side.split())
         assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
-
-
-def test_numbers_that_differ_by_rounding_are_not_shown():
-    """The mistake is elsewhere: in what the answer says of itself, for example."""
-    ours = np.array([[0.6, 0.8, 0.0, 0.0]])
-    one = answered("forward_kinematics", {}, {"rotations": ours + 1e-15}, {"rotations": ours})
-    assert comparison.rows(one) == []
 
 
 def a_wrong_task(share, words=MEND):
@@ -410,12 +402,6 @@ def test_chinese_leaves_no_english_sentence(right, make):
     assert re.search(r"[\u4e00-\u9fff]{2}", made) or make == "junit"
 
 
-def test_every_word_of_the_page_has_a_translation():
-    translate = translator("zh")
-    for words in page.WORDS.values():
-        assert words.text(translate) != str(words)
-
-
 @pytest.mark.parametrize(
     ("text", "size", "expected"),
     [
@@ -505,6 +491,8 @@ def test_rounded_output_is_not_shown_beside_a_wrong_one():
     theirs = {name: value + 1e-8 for name, value in ours.items()}
     one = answered("forward_kinematics", {}, theirs, ours)
     assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions", "rotations"}
+    near = {name: value + 1e-15 for name, value in ours.items()}
+    assert comparison.rows(answered("forward_kinematics", {}, near, ours)) == []
     theirs["positions"] = theirs["positions"] + 1e-3
     assert {row.label[:9] for row in comparison.rows(one, 9)} == {"positions"}
     negated = {"rotations": -ours["rotations"]}
