@@ -16,13 +16,14 @@ from plumbob.bench.harness import timing
 from plumbob.bench.harness.record import RecordFile
 from plumbob.bench.peers import opening
 from plumbob.bench.peers.sources import commit_of, digest_of
+from plumbob.bench.peers.user_chain import joint_positions
 from plumbob.bench.problems import models
 from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
 from plumbob.cli.main import run_command
-from plumbob.reference import forward_kinematics
+from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
 from plumbob.verify.door import open_contestant
 
@@ -205,6 +206,15 @@ def test_a_program_is_timed_by_its_own_clock_or_by_round_trips(folder, extra, re
     (record,) = records("My program")
     assert remark in record.measured["remark"]
     assert (record.measured["seconds"] < 1e-6).all() == bool(extra)
+
+
+def test_positions_that_stretch_links_or_move_the_root_are_no_answer():
+    skeleton, straight = Skeleton([-1, 0, 1], np.eye(3)), np.eye(3).cumsum(axis=0)
+    kept = joint_positions(skeleton, {"positions": straight}, None)
+    np.testing.assert_array_equal(kept, straight)
+    for wrong in (2.0 * straight, straight + 1e-3, np.full((3, 3), np.nan)):
+        with pytest.raises(ValueError, match="do not keep the links' lengths or the root"):
+            joint_positions(skeleton, {"positions": wrong}, None)
 
 
 def entrants(*words):
