@@ -102,7 +102,7 @@ def test_a_python_file_gets_its_verdict_and_all_files(capsys, folder, verdict):
     assert code == (0 if verdict == "right" else 1)
     passed = 4 if verdict == "right" else 0
     last = f"forward_kinematics: {verdict.upper()}, {passed}/4 cases passed"
-    assert err.splitlines()[-1] == last
+    assert last in err.splitlines()  # a busy machine may print a line on its search behind it
     assert f"forward_kinematics  {verdict.upper()} " in out
     assert WORDS[verdict] in " ".join(out.split()) or WORDS[verdict] in out
     assert out.encode()
