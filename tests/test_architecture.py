@@ -1,7 +1,6 @@
 """The drawing of the house is what the imports say now."""
 
 import draw_architecture as draw
-import pytest
 
 
 def test_the_committed_drawing_is_what_the_imports_say():
@@ -16,16 +15,3 @@ def test_every_package_and_module_of_a_room_has_a_box():
         files = {path.stem for path in folder.glob("*.py")} - {"__init__", "__main__"}
         drawn = {name.split("/")[1] for name in draw.graph(room)} - {"__main__"}
         assert drawn >= packages | files
-
-
-@pytest.mark.parametrize(
-    ("arrows", "expected"),
-    [
-        ({"a": "bc", "b": "c", "c": ""}, {"a": "b", "b": "c", "c": ""}),
-        ({"a": "bc", "b": "ac", "c": ""}, {"a": "bc", "b": "ac", "c": ""}),
-    ],
-    ids=["a chain replaces an arrow", "a cycle keeps all"],
-)
-def test_arrows_are_reduced(arrows, expected):
-    found = draw.reduced({name: set(below) for name, below in arrows.items()})
-    assert found == {name: set(below) for name, below in expected.items()}

@@ -8,7 +8,6 @@ from plumbob.crosscheck.engines import (
     SKELETON_ENGINES,
     MujocoFlex,
     MujocoMassSpring,
-    forward_kinematics_by,
 )
 from plumbob.crosscheck.engines.skeleton_engine import coordinates
 from plumbob.crosscheck.tolerances import TOLERANCES
@@ -24,16 +23,6 @@ DIFFERENCE_TOLERANCE = 1e-8
 @pytest.fixture(params=SKELETON_ENGINES)
 def engine_of(request):
     return SKELETON_ENGINES[request.param]
-
-
-def test_batches_keep_their_axes(engine_of):
-    skeleton = samples.skeleton(3)
-    local = samples.local_rotations(3, skeleton, 2, 3)
-    engine = engine_of(skeleton)
-    batch = forward_kinematics_by(engine, local)
-    one = forward_kinematics_by(engine, local[1, 2])
-    assert np.array_equal(batch.positions[1, 2], one.positions)
-    assert np.array_equal(batch.rotations[1, 2], one.rotations)
 
 
 def test_jacobian_is_the_derivative_of_the_position(engine_of):

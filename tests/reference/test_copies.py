@@ -57,10 +57,3 @@ def test_a_target_keeps_its_own_numbers(kind):
     assert list(target.position) == [0.3, 0.1, 0.4]
     assert list(target.rotation) == [1.0, 0.0, 0.0, 0.0]
     assert type(target.position) is type(position)
-
-
-def test_what_no_target_can_hold_is_refused_where_it_is_used():
-    strange = [[0.0], "a"]
-    assert Target(strange).position == strange
-    with pytest.raises(ValueError, match=r"^target: expected an array of numbers"):
-        solve_ik(ARM, REST, Target(strange))

@@ -53,11 +53,6 @@ def test_the_heart_is_the_cardioid():
     np.testing.assert_allclose(np.hypot(x, z), 0.5 * (1 - np.sin(t)), atol=1e-8)
 
 
-def test_the_square_has_its_side():
-    x, _, z = curves["square"](160).T
-    np.testing.assert_allclose(np.maximum(np.abs(x), np.abs(z)), 0.2, rtol=1e-14)
-
-
 def test_the_triangle_starts_at_its_corner_at_the_origin():
     points = curves["triangle"](150)
     assert (points[0] == 0.0).all()

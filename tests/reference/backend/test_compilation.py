@@ -68,11 +68,6 @@ def callee_of(kernel, inlined_size=compiled.INLINED_SIZE):
     return dispatcher.py_func.__globals__["power"]
 
 
-def test_a_callee_is_compiled_once_for_all_integers():
-    """Three calls with 2, 3 and a number only known later."""
-    assert len(callee_of(fresh(polynomial)).signatures) == 1
-
-
 def test_this_numba_is_of_a_series_that_the_linker_is_tested_with():
     """After an update of numba: run all tests of the backend, and raise `linking.NEWEST`."""
     assert linking.OLDEST == (0, 61)  # the lowest that pyproject.toml allows

@@ -353,13 +353,6 @@ class TestReasons:
         result = certify_ik(model, [0.1, 0.2, 0.0], target)
         assert result.coverage == IKCoverage.SINGULAR
 
-    def test_newtons_method_ends_elsewhere(self):
-        """Nothing is proven of balls with limits, which stay where they are."""
-        balls = Articulation(Skeleton([-1, 0, 1], [[0, 0, 0], [1, 0, 0], [0.8, 0, 0]]),
-                             ["ball", "hinge", "fixed"], cones=[0.5, np.inf, np.inf])  # fmt: skip
-        result = certify_ik(balls, balls.neutral(), [1.0, 0.5, 0.2])
-        assert result.coverage == IKCoverage.TOO_FEW_FREEDOMS
-
     def test_a_limit_within_the_distance(self, monkeypatch):
         monkeypatch.setattr(certificate, "MARGIN", 0.0)
         model = elbow(0.0, 1.0)

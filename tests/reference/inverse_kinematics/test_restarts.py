@@ -60,6 +60,11 @@ def test_one_restart_from_the_very_answer_arrives(arm, solver, backend, rng):
     np.testing.assert_allclose(solution.coordinates, random[1], rtol=0, atol=1e-15)
     other = solve_ik(arm, arm.random(rng), target, solver, restarts=3, seed=12, max_iterations=0)
     assert other.outcome is Outcome.ITERATION_LIMIT
+    if solver != "levenberg_marquardt":  # whose attempts take turns
+        q, options = arm.random(rng), {"seed": 11, "max_iterations": 5}
+        one, more = (solve_ik(arm, q, target, solver, restarts=n, **options) for n in (0, 3))
+        assert more.iterations == one.iterations  # the nearest restart comes first
+        assert more.outcome is Outcome.CONVERGED
 
 
 def test_restarts_follow_from_the_seed(arm, poses, rng):

@@ -9,7 +9,6 @@ from plumbob.reference import (
     Outcome,
     Skeleton,
     Target,
-    forward_kinematics,
     rotation,
     scenes,
     solve_ik,
@@ -76,13 +75,6 @@ def test_by_default_a_robot_settles(solver, chain_of_joints, rng):
         assert solution.excess == pytest.approx(
             solution.residual - 0.5 * model.skeleton.reach(), abs=1e-12
         )
-
-
-def test_where_nothing_is_proven_the_excess_is_the_residual(solver, chain_of_joints, rng):
-    model = chain_of_joints("hinge", rng, lower=-0.5, upper=0.5)
-    targets = forward_kinematics(model, rng.uniform(-3, 3, (10, 5)) * 0.1).positions[:, -1]
-    solution = solve_ik(model, model.neutral(), targets, solver, max_iterations=3)
-    assert (solution.excess == solution.residual).all()
 
 
 def arm_with_limits(rng):
