@@ -29,12 +29,15 @@ CLAIMS = {"residual", "iterations", "converged"}
 CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "tolerance": ({"max_iterations": 100, "tolerance": 0.0}, {"tolerance": 0.1}),
     "max_iterations": ({"max_iterations": 100, "tolerance": 0.0}, {"max_iterations": 1}),
+    "h": ({"h": 0.01}, {"h": 0.02}),
     "gravity": ({"gravity": np.array([0.0, -9.81, 0.0])}, {"gravity": np.array([1.0, -8.0, 3.0])}),
 }
 # A distance that ends solves is no larger than this share of the reach, and than this [m].
 LOOSEST, FARTHEST = 0.02, 0.1
 # The most sweeps that are counted, and the orders of joints in them.
 MOST_SWEEPS, ORDERS = 200, (0, 1)
+# The longest step of a greeting [s].
+LONGEST = 1.0
 # The energies that gravity changes.
 ENERGIES = ("gravitational", "potential", "total")
 
@@ -163,7 +166,24 @@ def gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
     return [float(f"{component:.6g}") for component in g] if np.isfinite(g).all() else None
 
 
+def step_length(contestant: Contestant, report: TaskReport) -> float | None:
+    """Return by how much a free particle moves for 1 m/s more [s], None if answers do not tell."""
+    case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
+    if case is None:
+        return None
+    x = case.inputs["positions"]
+    ends = [
+        _outputs(contestant, case, {"velocities": np.full_like(x, speed)}).get("positions")
+        for speed in (0.0, 1.0)
+    ]
+    if any(end is None for end in ends):
+        return None
+    h = float(np.diff([end.reshape(-1, *x.shape)[0, 0, 0] for end in ends])[0])
+    return float(f"{h:.6g}") if 0.0 < h <= LONGEST else None
+
+
 # How the constants in place of inputs are measured.
 MEASURES: Mapping[str, Callable[[Contestant, TaskReport], Any]] = {
     "tolerance": tolerance, "max_iterations": max_iterations, "gravity": gravity,
+    "h": step_length,
 }  # fmt: skip

@@ -30,6 +30,7 @@ Distance = Annotated[
 Acceleration = Annotated[
     float, Meta(ge=-1000, le=1000, description="more takes particles out of their scenes")
 ]
+Seconds = Annotated[float, Meta(gt=0, le=1, description="scenes are judged after one step")]
 # The most iterations of all substeps of a step, for the same reason.
 MOST_ITERATIONS = 1000
 
@@ -103,11 +104,13 @@ class Fixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         max_iterations: the iterations of a solve that does not end earlier.
         tolerance: distance that counts as reached [m]; 0 if no distance ends a solve.
         gravity: acceleration [m/s²]; zeros without gravity.
+        h: length of a step [s].
     """
 
     max_iterations: Iterations | None = None
     tolerance: Distance | None = None
     gravity: tuple[Acceleration, Acceleration, Acceleration] | None = None
+    h: Seconds | None = None
 
 
 class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -47,9 +47,15 @@ class Restriction(NamedTuple):
     about: Sentence  # what it is judged on
     sentence: Sentence  # how its answers show that
     asks: bool = False  # whether it is a mistake unless the greeting declares it
-    measured: bool = False  # whether a constant takes its place, which `fixed` declares
+    # what shows it: a key of `_DETECTORS`
+    detection: str = "replaced"
     unused: bool = False  # whether answers do not depend on it at all
     tasks: Sequence[str] = tuple(TASKS)  # those that it is inferred of
+
+    @property
+    def measured(self) -> bool:
+        """Whether a constant takes the place of the input, which `fixed` declares."""
+        return self.detection == "constant"
 
 
 # Restrictions, each with how answers show it.
@@ -80,8 +86,6 @@ _REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
 }
 # Inputs that are sent only if the greeting asks for them.
 _ADDED = ("rest_positions", "previous_positions")
-# Inputs of which each request has only one.
-_EITHER = ("count", "spacing")
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
@@ -96,15 +100,17 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
         return report
     is_sound = report.verdict is Verdict.RIGHT_EXCEPT
-    evidence = [
-        (known, why)
+    shown = [
+        (r, why)
         for r in RESTRICTIONS
         if not is_sound or r.measured
         if (why := _evidence(contestant, report, r))
-        if (known := _with_constant(contestant, report, r))
     ]
+    known = [(_with_constant(contestant, report, restriction), why) for restriction, why in shown]
+    evidence = [(restriction, why) for restriction, why in known if restriction]
+    unknown = [r for (r, _), (measured, _) in zip(shown, known, strict=True) if measured is None]
     if not evidence:
-        return report
+        return _with_unknown(report, unknown)
 
     def judged(items: Evidence) -> TaskReport:
         return precision.examine(examination, examination.judge(restricted(greeting, items)))
@@ -112,12 +118,25 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     best = judged(evidence)
     if best.verdict > Verdict.RIGHT_EXCEPT:
         is_worse = is_sound or _passed(best) < _passed(report)
-        return report if is_worse else _restricted_report(report, best, evidence)
+        best = report if is_worse else _restricted_report(report, best, evidence)
+        return _with_unknown(best, unknown)
     for item in [item for item in evidence if not item[0].measured]:
         fewer = [other for other in evidence if other is not item]
         if fewer and (simpler := judged(fewer)).verdict <= Verdict.RIGHT_EXCEPT:
             evidence, best = fewer, simpler
     return _restricted_report(report, best, evidence)
+
+
+def _with_unknown(report: TaskReport, unknown: Sequence[Restriction]) -> TaskReport:
+    """Return the report on wrong answers with inputs that answers ignore for unknown constants."""
+    if report.verdict < Verdict.WRONG or not unknown:
+        return report
+    words = sentence(
+        "Its answers do not depend on {inputs}. If that is meant, declare the constants of your "
+        'program in "fixed"; if not, it is a mistake.',
+        inputs=", ".join(restriction.input for restriction in unknown),
+    )
+    return replace(report, assumptions=(*report.assumptions, words))
 
 
 def _passed(report: TaskReport) -> float:
@@ -183,28 +202,38 @@ def _evidence(
     contestant: Contestant, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return how answers show that a solver does not take an input, None if they do not."""
+    is_tried = report.task in restriction.tasks
+    return _DETECTORS[restriction.detection](contestant, report, restriction) if is_tried else None
+
+
+def _constant(
+    contestant: Contestant, report: TaskReport, restriction: Restriction
+) -> Sentence | None:
+    """Return that answers do not depend on an input, None if they do or it is declared."""
+    is_open = getattr(contestant.greeting.fixed, restriction.input) is None
+    is_constant = is_open and is_unread(contestant, report, restriction.input)
+    return restriction.sentence if is_constant else None
+
+
+def _points(_: Contestant, report: TaskReport, restriction: Restriction) -> Sentence | None:
+    """Return that answers to targets are positions alone, None if they are not."""
     answers = [j.answer.values for j in report.judgements if isinstance(j.answer, Answer)]
-    names = [field.name for field in TASKS[report.task].inputs]
-    if report.task not in restriction.tasks:
-        return None
-    if restriction.measured:
-        is_open = getattr(contestant.greeting.fixed, restriction.input) is None
-        is_constant = is_open and is_unread(contestant, report, restriction.input)
-        return restriction.sentence if is_constant else None
-    if restriction.input in _EITHER:
-        return _unread(contestant, report, restriction) if restriction.input in names else None
-    if restriction.input in _REPLACEMENTS:
-        is_input = restriction.input in names
-        return _unchanged(contestant, report, restriction) if is_input else None
-    if restriction.input == "local_rotations":
-        are_points = bool(answers) and all("local_rotations" not in values for values in answers)
-        return restriction.sentence if "target" in names and are_points else None
-    if not {"offsets", "positions"} & set(names):
+    are_points = bool(answers) and all("local_rotations" not in values for values in answers)
+    return restriction.sentence if "target" in _inputs_of(report) and are_points else None
+
+
+def _plane(_: Contestant, report: TaskReport, restriction: Restriction) -> Sentence | None:
+    """Return that answers stay in the plane z = 0, or that none come; None if they do not."""
+    answers = [(j.case, j.answer.values) for j in report.judgements if isinstance(j.answer, Answer)]
+    if not {"offsets", "positions"} & _inputs_of(report):
         return None
     if not answers:
         return UNRELATED
-    cases = [j.case for j in report.judgements if isinstance(j.answer, Answer)]
-    return restriction.sentence if all(map(_is_flat, cases, answers)) else None
+    return restriction.sentence if all(_is_flat(*pair) for pair in answers) else None
+
+
+def _inputs_of(report: TaskReport) -> set[str]:
+    return {field.name for field in TASKS[report.task].inputs}
 
 
 def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
@@ -222,8 +251,9 @@ def _unchanged(
     contestant: Contestant, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return how an input does not change answers, None if it does; the other inputs are plain."""
-    name, names = restriction.input, {field.name for field in TASKS[report.task].inputs}
-    pairs = []
+    name, names, pairs = restriction.input, _inputs_of(report), []
+    if name not in names:
+        return None
     for case in sorted((j.case for j in report.judgements), key=lambda case: -case.size):
         plain = _plain(case, names)
         full = {key: value for key, value in plain.items() if key != name or name not in _ADDED}
@@ -292,6 +322,13 @@ def _reason(
         return UNRELATED
     is_added = restriction.input in _ADDED
     return restriction.sentence if _are_same(plain, full) and not is_added else None
+
+
+# What shows a restriction; each returns how, or None if it does not show.
+_DETECTORS: Mapping[str, Callable[[Contestant, TaskReport, Restriction], Sentence | None]] = {
+    "replaced": _unchanged, "constant": _constant, "absent": _unread, "points": _points,
+    "plane": _plane,
+}  # fmt: skip
 
 
 def _are_same(first: Answer, second: Answer) -> bool:

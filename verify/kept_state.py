@@ -36,7 +36,7 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     if not share:
         return report
     words = with_code(FAULT["code"], Sentence(FAULT["sentence"], {}))
-    explanations = (Explanation((NAME,), words, share, 0.0),)
+    explanations = (Explanation((NAME,), words, share, 0.0), *report.diagnosis.explanations)
     is_certain = report.task not in STEPS
     diagnosis = replace(
         report.diagnosis, explanations=explanations, first_broken=None, is_certain=is_certain

@@ -8,7 +8,7 @@ import msgspec
 
 from plumbob.text.sentence import Sentence, codes_in, sentence
 
-from . import inference, kept_state, precision
+from . import inference, kept_state, precision, zeros
 from .case import Case
 from .cause_search import SECONDS, CauseSearch, JudgedAnswers
 from .contestant import Contestant, Exchange, Failure, NoGreetingError, is_hung
@@ -35,7 +35,9 @@ Notify = Callable[[Sentence, int, int | None], None]
 
 
 # What is found out about answers beside laws, in this order.
-EXAMINERS: Sequence[Examiner] = (precision.examine, inference.examine, kept_state.examine)
+EXAMINERS: Sequence[Examiner] = (
+    precision.examine, inference.examine, zeros.examine, kept_state.examine,
+)  # fmt: skip
 
 
 def verify(

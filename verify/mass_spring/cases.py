@@ -26,6 +26,8 @@ MOTION_STEPS = 6
 SPATIAL = ("symmetry", "compression")
 # Families that need no gravity, or one in another direction.
 OF_GRAVITY = ("rest", "gravity")
+# Families that compare steps of different lengths, or need a short one.
+OF_H = ("h changes", "small h")
 # Dampers of a step that add no forces of springs' dampers.
 UNDAMPED = ("none", "global_factor")
 # Scenes of more particles are cloths, which lie level.
@@ -79,6 +81,8 @@ def _suitable(task: str, greeting: Greeting, drawn: Sequence[SpringScene]) -> li
         drawn = [_in_plane(scene) for scene in drawn if scene.family not in SPATIAL]
     if greeting.fixed.gravity is not None:
         drawn = _with_gravity(drawn, np.array(greeting.fixed.gravity))
+    if (h := greeting.fixed.h) is not None:
+        drawn = [replace(scene, h=h) for scene in drawn if scene.family not in OF_H]
     if task == "mass_spring_forces" and greeting.step.damper in UNDAMPED:
         drawn = [replace(scene, dampings=0.0 * scene.dampings) for scene in drawn]
     suitable = [

@@ -190,6 +190,9 @@ template <class List> std::string write(const List& list) {
     return out + ']';
 }
 
+template <class T> struct is_braced : std::false_type {};
+template <class T> struct is_braced<std::initializer_list<T>> : std::true_type {};
+
 class Request {
   public:
     std::string task;
@@ -203,7 +206,8 @@ class Request {
     // A field becomes what it is given to: double offset = in["offset"]; null is NaN.
     struct Field {
         const Value& value;
-        template <class T> operator T() const {
+        // Not to a list in braces, which vectors are assigned from as well.
+        template <class T, std::enable_if_t<!is_braced<T>::value, int> = 0> operator T() const {
             T out;
             read(value, out);
             return out;

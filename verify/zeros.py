@@ -1,0 +1,76 @@
+"""Ask with almost zero in the place of zero: `damping || 1` takes 0 for a missing number."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from plumbob.text.sentence import sentence
+
+from .contestant import Answer, Contestant
+from .examination import Examination
+from .gaps import largest_gap
+from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
+
+# Inputs of springs that may be zero.
+NAMES = ("stiffnesses", "dampings")
+# Almost zero. Right answers change by about this share of what 1 in its place changes, other ones
+# by as much as another number does.
+ALMOST, JUMP = 1e-6, 1e-2
+TRIALS = 3
+
+
+def examine(examination: Examination, report: TaskReport) -> TaskReport:
+    """Return the report on wrong answers that are right with almost zero in the place of zero."""
+    wrong = [j for j in report.judgements if j.verdict >= Verdict.UNDECIDED]
+    if report.verdict < Verdict.UNDECIDED or report.original is not None:
+        return report
+    for name in NAMES:
+        concerned = [j for j in wrong if _has_zeros(j, name)]
+        if not concerned or not _jumps(examination.contestant, concerned[:TRIALS], name):
+            continue
+        words = sentence(
+            "Where {name} are 0 its answers are not those of almost 0: it takes 0 for a missing "
+            "number, as {name} || 1 or {name} or 1 does. Test whether the number is missing.",
+            name=name,
+        )
+        share = len(concerned) / len(wrong)
+        explanation = Explanation((f"zero {name}",), words, share, 0.0)
+        diagnosis = replace(
+            report.diagnosis, explanations=(explanation,), first_broken=None,
+            is_certain=share == 1.0,
+        )  # fmt: skip
+        return replace(report, diagnosis=diagnosis)
+    return report
+
+
+def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
+    values = judgement.case.inputs.get(name)
+    return values is not None and np.size(values) > 0 and not np.all(values)
+
+
+def _jumps(contestant: Contestant, judgements: Sequence[CaseJudgement], name: str) -> bool:
+    """Return whether answers with zeros differ from those with almost zeros, in every case."""
+    for judgement in judgements:
+        values = np.asarray(judgement.case.inputs[name])
+        zero, almost, other = (
+            _outputs(contestant, judgement, {name: np.where(values == 0.0, number, values)})
+            for number in (0.0, ALMOST, 1.0)
+        )
+        gaps = [_gap(almost, outputs) for outputs in (zero, other)]
+        if not (zero and almost and other) or not JUMP * gaps[1] < gaps[0] < np.inf:
+            return False
+    return True
+
+
+def _outputs(
+    contestant: Contestant, judgement: CaseJudgement, change: Mapping[str, Any]
+) -> Mapping[str, Any]:
+    case = replace(judgement.case, inputs={**judgement.case.inputs, **change})
+    answer = contestant.answer(case)
+    return answer.values if isinstance(answer, Answer) else {}
+
+
+def _gap(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
+    return max((largest_gap(first[n], second[n]) for n in first.keys() & second.keys()), default=0)
