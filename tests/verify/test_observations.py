@@ -10,7 +10,6 @@ from kinematics_solvers import textbook
 from observed_programs import PROGRAMS
 
 from plumbob.reference import rotation
-from plumbob.verify.contestant import Answer
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
