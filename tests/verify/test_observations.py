@@ -412,7 +412,7 @@ def test_observations_stay_if_the_search_for_causes_fails(monkeypatch):
 
     program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
     module = sys.modules["plumbob.verify.verify"]
-    monkeypatch.setattr(module.Attempt, "_explain", fails)
+    monkeypatch.setattr(module.Attempt, "_explained", fails)
     report = module.verify(contestant_of(program, FORWARD)).tasks[0]
     assert report.verdict is Verdict.WRONG
     assert "at leaves and nowhere else" in str(report.diagnosis.observations[0])

@@ -71,7 +71,8 @@ def task_cases(task: str, greeting: Greeting, seed: int, thorough: bool) -> list
 
 def telling_cases(task: str, greeting: Greeting, seed: int) -> list[Case]:
     """Return requests to ask after a wrong verdict, of which each spring's pull can be solved."""
-    drawn = [_random(seed, **entry) for entry in _TABLE["telling"]]
+    about = sentence("a request that tells mistakes apart; no part of the verdict")
+    drawn = [_random(seed, about=about, **entry) for entry in _TABLE["telling"]]
     return _suitable(task, greeting, drawn)
 
 
