@@ -157,10 +157,10 @@ class Attempt:
             with search.limited():
                 return observations.observe(self.contestant, verdict, self._seed)
 
-        nothing: tuple[Sentence, ...] = ()
-        found = search.run(observe_in_time, nothing)
+        silence: tuple[Sentence, ...] = ()
+        observed = search.run(observe_in_time, silence)
         is_failed = search.end is not None and not search.is_interrupted
-        return (search.end,) if is_failed and search.end else found
+        return (search.end,) if is_failed and search.end else observed
 
     def explain(
         self, verdict: TaskReport, reports: Sequence[TaskReport], cause_search: CauseSearch

@@ -26,7 +26,7 @@ from plumbob.verify.observe import (
     springs,
 )
 from plumbob.verify.observe.equalities import Equalities
-from plumbob.verify.observe.separation import Table
+from plumbob.verify.observe.separation import ElementTable
 from plumbob.verify.verify import DISCIPLINES, verify
 
 FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
@@ -136,7 +136,7 @@ def tables_of_trees(count, seed):
     rng = np.random.default_rng(seed)
     kinds = ("root", "leaf", "child_of_root", "branching", "last_joint")
     for k in range(count):
-        table, kind = Table("rotation"), kinds[k % len(kinds)]
+        table, kind = ElementTable("rotation"), kinds[k % len(kinds)]
         for case in range(20):
             joints_ = int(rng.integers(2, 9))
             parents = np.array([-1, *(int(rng.integers(0, j)) for j in range(1, joints_))])
@@ -151,7 +151,7 @@ def tables_of_trees(count, seed):
 
 def shuffled(table, rng):
     """Return a table with the labels shuffled within each case."""
-    copy = Table("rotation")
+    copy = ElementTable("rotation")
     for name in {element.case: None for element in table.elements}:
         elements = [element for element in table.elements if element.case == name]
         labels = [element.is_wrong for element in elements]
@@ -173,7 +173,7 @@ def any_count(tables):
 def few_cases(table, count):
     """Return the elements of the first cases of a table."""
     names = list({element.case: None for element in table.elements})[:count]
-    copy = Table("rotation")
+    copy = ElementTable("rotation")
     copy.elements = [element for element in table.elements if element.case in names]
     return copy
 
@@ -191,7 +191,7 @@ def test_separations_are_found_and_shuffled_labels_show_none(monkeypatch):
 
 def table(*cases, **of_all):
     """Return a table of cases, each a list of errors, wrong at leaves where a feature says so."""
-    result = Table("rotation", **of_all)
+    result = ElementTable("rotation", **of_all)
     for i, errors in enumerate(cases):
         features = {"leaf": np.arange(len(errors)) == len(errors) - 1}
         result.add(f"case {i}", errors, features)
@@ -219,7 +219,7 @@ def test_errors_between_right_and_wrong_count_for_neither(monkeypatch):
 
 
 def test_one_sided_statements_allow_a_quarter_of_exceptions(monkeypatch):
-    result = Table("rotation")
+    result = ElementTable("rotation")
     for case in range(20):  # all wrong joints are leaves, but two more leaves are right
         errors = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
         result.add(f"case {case}", errors, {"leaf": np.arange(6) > 2})

@@ -11,7 +11,7 @@ from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..contestant import Answer, Contestant
-from ..explain import difference
+from ..gaps import difference
 from ..greeting import Greeting
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import solve
@@ -131,8 +131,8 @@ def _arrives(case: Case, answer: Answer) -> bool:
 
 def _are_same(first: Answer, second: Answer) -> bool:
     names = (first.values.keys() & second.values.keys()) - CLAIMS
-    one, other = ({name: answer.values[name] for name in names} for answer in (first, second))
-    return bool(names) and difference(one, other) <= SAME
+    values, repeats = ({name: answer.values[name] for name in names} for answer in (first, second))
+    return bool(names) and difference(values, repeats) <= SAME
 
 
 def _forward(inputs: Mapping[str, Any], method: str) -> Mapping[str, Any]:

@@ -2,7 +2,7 @@
 
 A joint's pose is held against the answered pose of its parent, a rotation of CCD against the
 answers for the joints below, a point of FABRIK against the point before. Otherwise an error at one
-joint would spread to all joints below, and nothing would tell them apart.
+joint would spread to all joints below, and its place would not show.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +20,7 @@ from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve
 from ..kinematics.textbook import SOLVERS
 from .equalities import Equalities
-from .separation import Table
+from .separation import ElementTable
 
 # Rotations by less count as none [rad]: the sine of half the angle is then about rounding.
 UNROTATED = 1e-7
@@ -30,10 +30,10 @@ EQUALITIES_OF_ONE_SWEEP = ("half_turn", "wrong_axis")
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-class Evidence(NamedTuple):
+class JointEvidence(NamedTuple):
     """Tables by quantity, and equalities."""
 
-    tables: dict[str, Table]
+    tables: dict[str, ElementTable]
     equalities: Equalities
 
 
@@ -91,20 +91,20 @@ def _unit(q: FloatArray) -> FloatArray:
 # Forward kinematics
 
 
-def forward_evidence(judgements: Sequence[CaseJudgement]) -> Evidence:
+def forward_evidence(judgements: Sequence[CaseJudgement]) -> JointEvidence:
     """Return what answers of forward kinematics show.
 
     A joint without rotation, and a link without length, count for neither side: they are right
     whatever a solver does.
     """
     sound = sound_cases(judgements)
-    tables = {name: Table(name, sound) for name in ("rotation", "position")}
+    tables = {name: ElementTable(name, sound) for name in ("rotation", "position")}
     equalities = Equalities(sound)
     for judgement in judgements:
         assert isinstance(judgement.answer, Answer)
         pose = ForwardPose(judgement.case.inputs, judgement.answer.values, judgement.expected)
         _add_forward(judgement.case.name, pose, tables, equalities)
-    return Evidence(tables, equalities)
+    return JointEvidence(tables, equalities)
 
 
 class ForwardPose:
@@ -128,7 +128,7 @@ class ForwardPose:
 
 
 def _add_forward(
-    name: str, pose: ForwardPose, tables: Mapping[str, Table], equalities: Equalities
+    name: str, pose: ForwardPose, tables: Mapping[str, ElementTable], equalities: Equalities
 ) -> None:
     features = joint_features(pose.inputs)
     parent = pose.of_parent(pose.rotations)
@@ -180,14 +180,14 @@ def _add_frames(name: str, pose: ForwardPose, links: FloatArray, equalities: Equ
 # Inverse kinematics
 
 
-def inverse_evidence(report: TaskReport, judgements: Sequence[CaseJudgement]) -> Evidence:
+def inverse_evidence(report: TaskReport, judgements: Sequence[CaseJudgement]) -> JointEvidence:
     """Return what poses of inverse kinematics show; right sweeps are those of the method."""
     method = _method(report)
     names = ("agreement", "unmoved", "length", *OF_ONE_SWEEP)
     sound, of_cases = sound_cases(judgements), ("root_position", "target", "pose")
-    tables = {name: Table(name, sound) for name in names}
-    tables |= {name: Table(name, sound, is_of_cases=True) for name in of_cases}
-    evidence = Evidence(tables, Equalities(sound))
+    tables = {name: ElementTable(name, sound) for name in names}
+    tables |= {name: ElementTable(name, sound, is_of_cases=True) for name in of_cases}
+    evidence = JointEvidence(tables, Equalities(sound))
     for judgement in judgements:
         pose = SolvedPose(judgement, method)
         if pose.is_valid:
@@ -243,13 +243,13 @@ class SolvedPose:
         return None if x is None else np.linalg.norm(x[1:] - x[self.parents[1:]], axis=1)
 
 
-def _add_pose(pose: SolvedPose, evidence: Evidence) -> None:
+def _add_pose(pose: SolvedPose, evidence: JointEvidence) -> None:
     tables, features = evidence.tables, joint_features(pose.inputs)
     whole, x = case_features(pose.case), pose.pose.answered_positions
     y = pose.pose.positions
-    for found in pose.judgement.findings:
-        if found.law == "target reached" and found.verdict is not Verdict.UNDECIDED:
-            tables["target"].add(pose.name, float(found.verdict >= Verdict.WRONG), whole)
+    for finding in pose.judgement.findings:
+        if finding.law == "target reached" and finding.verdict is not Verdict.UNDECIDED:
+            tables["target"].add(pose.name, float(finding.verdict >= Verdict.WRONG), whole)
     root = y if x is None else x
     gap = np.abs(root[0] - pose.offsets[0]).max() / pose.size
     tables["root_position"].add(pose.name, gap, whole)
@@ -278,7 +278,9 @@ def _add_lengths(pose: SolvedPose, equalities: Equalities) -> None:
     equalities.add("length_before", pose.name, *gaps)
 
 
-def _add_rotations(pose: SolvedPose, evidence: Evidence, features: Mapping[str, BoolArray]) -> None:
+def _add_rotations(
+    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
+) -> None:
     """Add what answered local rotations show, of the path and elsewhere."""
     local, x, parents = pose.local, pose.pose.answered_positions, pose.parents
     assert local is not None
@@ -319,7 +321,9 @@ def _global_rotations(pose: SolvedPose, local: FloatArray) -> FloatArray:
     return forward({**pose.inputs, "local_rotations": unit})[1]
 
 
-def _add_turns(pose: SolvedPose, evidence: Evidence, features: Mapping[str, BoolArray]) -> None:
+def _add_turns(
+    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
+) -> None:
     """Add the rotation of each joint in a sweep of CCD, given the answers for the joints below."""
     local, joints = pose.pose.local, pose.path[-2::-1]
     if local is None or not len(joints) or not np.isfinite(local[pose.path]).all():
@@ -354,7 +358,9 @@ def _effector_in_frames(pose: SolvedPose, local: FloatArray) -> Iterator[tuple[f
         yield end
 
 
-def _add_points(pose: SolvedPose, evidence: Evidence, features: Mapping[str, BoolArray]) -> None:
+def _add_points(
+    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
+) -> None:
     """Add the points of FABRIK's forward pass, each given the answered point before."""
     y = pose.pose.positions[pose.path]
     z = np.array(forward(pose.inputs)[0][pose.path])

@@ -20,12 +20,12 @@ from . import inputs, requests
 from .joints import (
     EQUALITIES_OF_ONE_SWEEP,
     OF_ONE_SWEEP,
-    Evidence,
+    JointEvidence,
     forward_evidence,
     inverse_evidence,
     sound_cases,
 )
-from .separation import Statement, Table, joined, separation
+from .separation import ElementTable, Statement, joined, separation
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
@@ -61,8 +61,8 @@ def observe(contestant: Contestant, report: TaskReport, seed: int) -> tuple[Sent
     method, greeting = report.method.lower(), report.greeting or contestant.greeting
     cases = requests.telling_cases(report.task, greeting, report.method, seed)
     answered += requests.ask(contestant, cases, method)
-    known = [judgement.case for judgement in report.judgements]
-    unread = inputs.unread_inputs(contestant, known, greeting, method)
+    counted = [judgement.case for judgement in report.judgements]
+    unread = inputs.unread_inputs(contestant, counted, greeting, method)
     with np.errstate(all="ignore"):
         return sentences(report, answered, greeting, unread)
 
@@ -82,15 +82,15 @@ def sentences(
     """Return what answers show, given the inputs that they do not depend on."""
     findings = FINDINGS[report.task](report, judgements, greeting, unread)
     first = [inputs.statement_of(unread)] if unread else []
-    chosen = [statement.sentence for statement in (*first, *findings.statements)][:SENTENCES]
-    if chosen and findings.right:
-        chosen.append(
+    words = [statement.sentence for statement in (*first, *findings.statements)][:SENTENCES]
+    if words and findings.right:
+        words.append(
             sentence("Right everywhere: {quantities}.", quantities=joined(findings.right[:RIGHT]))
         )
-    return tuple(chosen)
+    return tuple(words)
 
 
-def of_tables(tables: Sequence[Table]) -> list[Statement]:
+def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
     """Return exact separations, else one-sided ones, else quantities that are wrong everywhere."""
     exact, vague, everywhere = list[Statement](), list[Statement](), list[Statement]()
     for table in tables:
@@ -111,7 +111,7 @@ def _score(statement: Statement) -> float:
     return statement.score
 
 
-def _of_joints(evidence: Evidence, unread: Sequence[str]) -> Findings:
+def _of_joints(evidence: JointEvidence, unread: Sequence[str]) -> Findings:
     tables, equalities = evidence.tables, evidence.equalities
     if "max_iterations" in unread:  # then no answer is that of one sweep
         tables = {k: table for k, table in tables.items() if k not in (*OF_ONE_SWEEP, "pose")}

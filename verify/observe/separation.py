@@ -43,7 +43,7 @@ def words_of(kind: str, key: str) -> Sentence:
     return Sentence(_TABLE[kind][key]["sentence"], {})
 
 
-class Element(NamedTuple):
+class JudgedElement(NamedTuple):
     """A joint, a particle or a case, of which a quantity is right or wrong."""
 
     case: str
@@ -67,7 +67,7 @@ class Statement(NamedTuple):
     is_exact: bool
 
 
-class Table:
+class ElementTable:
     """The elements of a quantity; cases with a right verdict, the sound ones, have no wrong one.
 
     What differs from the usual in a sound case is another honest choice.
@@ -76,7 +76,7 @@ class Table:
     def __init__(self, quantity: str, sound: Set[str] = frozenset(), is_of_cases: bool = False):
         self.quantity, self.is_of_cases = words_of("quantity", quantity), is_of_cases
         self._sound, self.is_law = sound, quantity in LAWS
-        self.elements: list[Element] = []
+        self.elements: list[JudgedElement] = []
 
     def add(
         self,
@@ -96,7 +96,7 @@ class Table:
         columns = {name: np.asarray(values).tolist() for name, values in features.items()}
         for i in np.flatnonzero(is_clear & is_counted).tolist():
             row = {name: c[i] if isinstance(c, list) else c for name, c in columns.items()}
-            self.elements.append(Element(case, bool(wrong[i]), row))
+            self.elements.append(JudgedElement(case, bool(wrong[i]), row))
 
     @property
     def wrong_count(self) -> int:
@@ -118,7 +118,7 @@ class Table:
         return sentence("{quantity} ({count})", quantity=self.quantity, count=len(self.elements))
 
 
-def separation(table: Table) -> Statement | None:
+def separation(table: ElementTable) -> Statement | None:
     """Return the feature of all wrong elements and no others, else a one-sided one, else None.
 
     Joints and particles are compared within the cases that have wrong ones: elsewhere a mistake
@@ -144,27 +144,27 @@ def separation(table: Table) -> Statement | None:
     return None if best is None else Statement(chance / 4.0, best[1], is_exact=False)
 
 
-def _support(elements: Sequence[Element], wrong: BoolArray, is_of_cases: bool) -> int:
+def _support(elements: Sequence[JudgedElement], wrong: BoolArray, is_of_cases: bool) -> int:
     """Return the number of cases in which both classes stand, or of the rarer class of cases."""
     if is_of_cases:
         return int(min(wrong.sum(), (~wrong).sum()))
     return sum(0 < sum(labels) < len(labels) for labels in _labels(elements).values())
 
 
-def _labels(elements: Sequence[Element]) -> dict[str, list[bool]]:
+def _labels(elements: Sequence[JudgedElement]) -> dict[str, list[bool]]:
     labels: dict[str, list[bool]] = {}
     for element in elements:
         labels.setdefault(element.case, []).append(element.is_wrong)
     return labels
 
 
-def _log_chance(elements: Sequence[Element], is_of_cases: bool) -> float:
+def _log_chance(elements: Sequence[JudgedElement], is_of_cases: bool) -> float:
     """Return log10 of the chance that a feature separates labels shuffled within each case."""
     groups = [[e.is_wrong for e in elements]] if is_of_cases else [*_labels(elements).values()]
     return -sum(log10(comb(len(group), sum(group))) for group in groups)
 
 
-def _predicates(elements: Sequence[Element], wrong: BoolArray) -> Iterator[Predicate]:
+def _predicates(elements: Sequence[JudgedElement], wrong: BoolArray) -> Iterator[Predicate]:
     """Yield each feature that some elements have and some lack, and its negation; then bounds."""
     shared = [n for n in elements[0].features if all(n in e.features for e in elements)]
     for name in shared:
@@ -228,7 +228,7 @@ def _stated(predicate: Predicate) -> Sentence:
 
 
 def _one_sided(
-    quantity: Sentence, predicate: Predicate, wrong: BoolArray, elements: Sequence[Element]
+    quantity: Sentence, predicate: Predicate, wrong: BoolArray, elements: Sequence[JudgedElement]
 ) -> tuple[float, Sentence] | None:
     """Return a weight and the words if all wrong elements have a feature, or all with it are wrong.
 
