@@ -311,7 +311,7 @@ def test_files_that_differ_exit_1(capsys, robots):
     code, out, _ = plumbob(capsys, "check", "--files", "robots/b.xml", "robots/arms")
     assert code == 1
     assert re.search(r"^robots/b.xml \(MJCF\): Pinocchio differs \(", out, re.MULTILINE)
-    assert "Of 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
+    assert "In 2 files 1 reading disagrees; 0 are parts that others include, 0 XML files are" in out
 
 
 @pytest.mark.parametrize("command", command_names.COMMANDS)
