@@ -109,16 +109,16 @@ def open_installed(
 
 
 def _open(address: SolverAddress) -> UserSolver:
-    contestant = open_contestant(address.spec, LIMITS)
+    solver = open_contestant(address.spec, LIMITS)
     try:
-        greeting = contestant.greeting
+        greeting = solver.greeting
     except NoGreetingError as error:
         why = one_line(str(error.failure.sentence), 300)
         raise ValueError(
             f"with: expected a solver that says what it is, got {address.text}: {why}"
         ) from None
     finally:
-        contestant.close()
+        solver.close()
     return UserSolver(
         _name(address, greeting),
         clean(address.text),
