@@ -210,12 +210,6 @@ def assert_same_tables(suites, executor, folder):
 
 
 @pytest.mark.slow
-def test_two_workers_give_the_same_tables_to_the_bit_as_one_process(executor, few, tmp_path):
-    few(arm=20, tracking=14)
-    assert_same_tables(["tracking", "arm"], executor, tmp_path)
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize("suite", sorted({e.suite for e in EXPERIMENTS if not e.times}))
 def test_every_suite_gives_the_same_tables_on_two_workers(executor, monkeypatch, suite, tmp_path):
     monkeypatch.setattr(run, "blocks", lambda *suite: (b for b in blocks(*suite) if not b.times))

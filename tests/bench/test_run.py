@@ -1,12 +1,8 @@
 """Running suites: each block is stored at once, stays on record, and is measured only once."""
 
-import json
 import os
-import random
-import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +14,7 @@ from plumbob.bench.experiments import Block
 from plumbob.bench.harness import machine, run
 from plumbob.bench.harness.folder_lock import locked
 from plumbob.bench.harness.machine import stamp
-from plumbob.bench.harness.record import RecordFile, decode, encode
+from plumbob.bench.harness.record import RecordFile, encode
 from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
@@ -249,72 +245,3 @@ def test_a_lock_is_free_once_its_process_was_killed(tmp_path):
         child.kill()
     with locked(tmp_path):
         pass
-
-
-COUNT = 40
-# A suite whose numbers depend on nothing, and whose records are long, so that kills hit a write.
-RUN = f"""
-import sys, time
-import numpy as np
-from plumbob.bench.experiments import Block
-from plumbob.bench.harness import run
-
-def measure(i):
-    time.sleep(0.002)
-    return {{"x": np.random.default_rng(i).random(20_000)}}
-
-def blocks(suite, scale):
-    for i in range({COUNT}):
-        yield Block(suite, f"p{{i}}", "a", lambda i=i: measure(i))
-
-run.blocks = blocks
-print("begun", flush=True)
-for event in run.run(["made up"], "quick", sys.argv[1]):
-    if event.state == run.MEASURED:
-        print(event.subject, flush=True)
-"""
-
-
-def begin(folder):
-    """A run in a process of its own, begun."""
-    command = [sys.executable, "-c", RUN, str(folder)]
-    child = subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, text=True)
-    assert child.stdout.readline() == "begun\n"
-    return child
-
-
-def whole_lines(folder):
-    path = RecordFile(folder).path
-    content = path.read_bytes() if path.exists() else b""
-    return content[: content.rfind(b"\n") + 1].splitlines()
-
-
-def without_times(folder):
-    return [
-        (*r.key, r.size, json.dumps(r.stamp), r.remark, r.measured["x"].tobytes())
-        for r in stored(folder)
-    ]
-
-
-@pytest.mark.slow
-def test_kills_at_random_moments_lose_nothing_finished_and_repeat_nothing(tmp_path):
-    chance, measured, folder, undisturbed = random.Random(12), [], tmp_path / "a", tmp_path / "b"
-    for kill in range(10):
-        if len(whole_lines(folder)) > COUNT:  # the run was through: begin another
-            folder, measured = tmp_path / f"again {kill}", []
-        before = whole_lines(folder)
-        with begin(folder) as child:
-            time.sleep(chance.uniform(0.0, 0.15))
-            child.send_signal(signal.SIGKILL)
-            measured += child.stdout.read().splitlines()
-        assert whole_lines(folder)[: len(before)] == before
-    with begin(folder) as child:
-        measured += child.stdout.read().splitlines()
-    with begin(undisturbed) as child:
-        child.wait()
-    lines = [decode(line) for line in whole_lines(folder)]
-    assert len({record.key for record in lines}) == len(lines) == COUNT + 1
-    assert len(set(measured)) == len(measured)
-    assert without_times(folder) == without_times(undisturbed)
-    assert len(stored(folder)) == COUNT
-    assert RecordFile(folder).read().warning == ""
