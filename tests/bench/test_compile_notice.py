@@ -55,4 +55,5 @@ def test_only_a_terminal_is_told_and_only_of_slow_ones(
     if not delay:
         timer.join(60.0)
     compile_notice._on_compile("forward_kinematics", False)
+    assert timer.finished.is_set()
     assert capsys.readouterr().err.splitlines() == lines
