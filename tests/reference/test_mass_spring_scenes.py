@@ -109,6 +109,12 @@ class TestLattice:
         assert volume == pytest.approx(1.0)
         assert pairs(system) == edges
 
+    def test_it_is_clamped_at_x_0(self):
+        system, state = scenes.lattice((3, 2, 2))
+        clamped = np.zeros(12, dtype=bool)
+        clamped[system.pinned] = True
+        np.testing.assert_array_equal(clamped, state.positions[:, 0] == 0)
+
 
 class TestClothFromMesh:
     def test_every_edge_is_a_spring_once(self):

@@ -12,6 +12,7 @@ from plumbob.reference import (
     Target,
     forward_kinematics,
     rotation,
+    set_backend,
 )
 from plumbob.reference.inverse_kinematics.mechanism import (
     TARGET,
@@ -22,16 +23,23 @@ from plumbob.reference.inverse_kinematics.mechanism import (
 from plumbob.reference.inverse_kinematics.reduce import prepare
 from plumbob.reference.inverse_kinematics.solve_mechanism import new_workspace
 
-# Anderson's CCD has tests of its own; here it is left to the sweep of slow tests.
+# Compiling these takes longer than their tests, which are left to the slow tests.
+RARE = ("damped_least_squares", "jacobian_transpose", "anderson_ccd")
 SOLVERS = [
-    pytest.param(name, marks=pytest.mark.slow if name == "anderson_ccd" else ())
-    for name in IK_SOLVERS
+    pytest.param(name, marks=pytest.mark.slow if name in RARE else ()) for name in IK_SOLVERS
 ]
 
 
 @pytest.fixture(params=SOLVERS)
 def solver(request):
     return request.param
+
+
+@pytest.fixture(params=IK_SOLVERS)
+def any_solver(request):
+    """Yield each solver; rare solvers run in the interpreter, which spares their compilation."""
+    with set_backend("python" if request.param in RARE else "numba"):
+        yield request.param
 
 
 def targets_by_pose(model, rng, count=1, oriented=0.5):

@@ -141,7 +141,7 @@ points = st.lists(coordinates, min_size=3, max_size=3)
 @given(
     links=st.lists(points, min_size=1, max_size=5),
     target=points,
-    solver=st.sampled_from(list(IK_SOLVERS)),
+    solver=st.sampled_from(["ccd", "fabrik", "levenberg_marquardt"]),
 )
 def test_there_is_always_an_answer_and_it_is_true(links, target, solver):
     chain = Skeleton(range(-1, len(links)), [[0.0, 0.0, 0.0], *links])

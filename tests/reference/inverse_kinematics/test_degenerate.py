@@ -215,7 +215,7 @@ def trees(draw):
 ANYTHING = {
     "model": trees(),
     "asked": st.lists(wanted, min_size=1, max_size=3),
-    "solver": st.sampled_from(list(IK_SOLVERS)),
+    "solver": st.sampled_from(["ccd", "fabrik", "levenberg_marquardt"]),
     "tolerance": st.sampled_from([0.0, 1e-9, 1e-3]),
     "seed": st.integers(0, 100),
     "restarts": st.integers(0, 1),
@@ -234,7 +234,7 @@ def test_there_is_always_an_answer_and_it_is_true(model, asked, solver, toleranc
 
 @pytest.mark.slow
 @settings(max_examples=5000)
-@given(**ANYTHING)
+@given(**(ANYTHING | {"solver": st.sampled_from(list(IK_SOLVERS))}))
 def test_there_is_always_an_answer_in_many_more_places(
     model, asked, solver, tolerance, seed, restarts
 ):

@@ -51,6 +51,7 @@ REACHED = {
 }
 
 
+@pytest.mark.sample(without=["damped_least_squares", "jacobian_transpose"])
 @pytest.mark.parametrize(("solver", "kind", "limits"), REACHED)
 def test_pairs_of_targets_that_a_pose_reaches_are_reached(solver, kind, limits, rng):
     bounds = {"lower": -1.5, "upper": 1.5, "cones": 1.5} if limits else {}
@@ -92,7 +93,7 @@ def test_the_heavier_target_is_missed_by_less(solver, backend):
     assert second[0] < second[1] - 0.05 < second[2] - 0.1
 
 
-@pytest.mark.parametrize("solver", ["ccd", "fabrik", "damped_least_squares"], indirect=True)
+@pytest.mark.parametrize("solver", ["ccd", "fabrik"], indirect=True)
 @pytest.mark.parametrize("order", [1, -1])
 def test_a_target_out_of_reach_does_not_keep_another_arm_from_its_own(solver, order, backend):
     """The arms part at the root; the one that cannot arrive is soon as near as it can be."""

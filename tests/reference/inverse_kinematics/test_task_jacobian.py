@@ -18,6 +18,7 @@ from plumbob.reference import (
 from plumbob.reference.inverse_kinematics.box_step import (
     damped_step,
     linearise_task,
+    transposed_step,
 )
 from plumbob.reference.inverse_kinematics.jacobian_methods import (
     DAMPING_OF_POSES,
@@ -112,11 +113,11 @@ STEPS = {
 }
 
 
-@pytest.mark.parametrize("solver", STEPS)
+@pytest.mark.parametrize("any_solver", STEPS, indirect=True)
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_one_iteration_is_the_textbook_s(problem, machine, solver, backend, kinds, seed):
+def test_one_iteration_is_the_textbook_s(problem, machine, any_solver, kinds, seed):
     model, q, targets = problem(kinds, seed)
     targets = [target._replace(weight=target.weight / 2.0) for target in targets]
     reach = machine(model, q, targets).mechanism.reach
@@ -125,9 +126,9 @@ def test_one_iteration_is_the_textbook_s(problem, machine, solver, backend, kind
     e, J = stacked(model, q, shares, reach)
     if not J.any():
         return
-    step = worth_of_freedoms(model, reach) * STEPS[solver](J, e, targets, reach)
+    step = worth_of_freedoms(model, reach) * STEPS[any_solver](J, e, targets, reach)
     solution = solve_ik(
-        model, q, targets, solver, tolerance=0.0, tolerance_rotation=0.0, max_iterations=1
+        model, q, targets, any_solver, tolerance=0.0, tolerance_rotation=0.0, max_iterations=1
     )
     if solution.iterations == 1:  # else nothing moves, or it is bent and asked again
         arrived = forward_kinematics(model, integrate(model, q, step))
@@ -178,6 +179,22 @@ def test_a_held_step_is_the_least_squares_solution_within_the_limits(rng, machin
     assert active > 100
 
 
+def test_a_transposed_step_leaves_out_what_limits_stop(rng, machine, chain_of_joints):
+    for _ in range(20):
+        _, _, _, (mechanism, target, data, workspace) = limited(rng, machine, chain_of_joints)
+        joints = mechanism.joints
+        data.q[:] = np.where(rng.random(len(data.q)) < 0.5, joints["lower"], joints["upper"])
+        linearise_task(mechanism, target, data, workspace.system)
+        J, e = workspace.system.J.T.copy(), workspace.system.e.copy()
+        transposed_step(mechanism, data, workspace.system)
+        g = J.T @ e
+        free = np.where(data.q == joints["lower"], g > 0.0, g < 0.0)
+        expected = np.zeros(len(g))
+        expected[free] = transposed(J[:, free], e, None, None)
+        np.testing.assert_allclose(workspace.system.step, expected, rtol=0, atol=ROUNDING)
+
+
+@pytest.mark.sample(without=["damped_least_squares", "jacobian_transpose"])
 @pytest.mark.parametrize("solver", STEPS)
 def test_a_hinge_that_covers_the_circle_goes_round_where_it_must(solver, backend):
     """From near its upper limit the smaller angle to the target leads beyond it."""

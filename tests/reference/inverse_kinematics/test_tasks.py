@@ -454,3 +454,21 @@ ROW, FLAT = np.ones(1), np.zeros((1, 7))
 def test_wrong_tasks_of_a_user_are_named(task, message):
     with pytest.raises(ValueError, match=message):
         solve_tasks(arm(), np.zeros(7), [task], restarts=0)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: tasks.FrameTask(0), "position: expected a position or a rotation, got neither"),
+        (lambda: tasks.Coupling(0, coefficients=[]), "coefficients: expected at least one"),
+        (lambda: tasks.LookAt(0, X, (0.0, 0.0, 0.0)), "axis: expected a direction"),
+        (lambda: tasks.CentreOfMass([0.0], [X], X), "masses: expected a positive sum"),
+        (lambda: solve_tasks(arm(), np.zeros(7), []), "tasks: expected a list"),
+        (lambda: solve_tasks(arm(), np.zeros(7), [X]), "tasks: expected tasks and Targets"),
+        (lambda: solve_tasks(arm(), np.zeros(7), [tasks.Coupling(7)]), "joint: expected a hinge"),
+        (lambda: solve_tasks(Skeleton([-1], [X]), [X], []), "model: expected an Articulation"),
+    ],
+)
+def test_wrong_tasks_are_named(call, message):
+    with pytest.raises(ValueError, match=message):
+        call()
