@@ -1,9 +1,12 @@
 """Solvers of kinematics for the tests: the textbook with chosen faults, and the reference."""
 
+from dataclasses import replace
+
 import conformance_students as students
 
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
 from plumbob.verify.case import Case
+from plumbob.verify.cause_search import CauseSearch, JudgedAnswers
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
@@ -46,6 +49,13 @@ def judged_some(task, function, method="", every=5):
     said = Greeting(1, (task,), methods=(method,))
     cases = DISCIPLINES[task].cases(said, method, 0, False)[::every]
     return judge_cases(FunctionContestant({task: function}, said), task, method, cases)
+
+
+def explained(task, exchanges, greeting, base=None):
+    """Return the report on answers with the faults that explain them."""
+    report = DISCIPLINES[task].judge(exchanges, greeting, "")
+    diagnosis = DISCIPLINES[task].diagnose(JudgedAnswers(report, greeting, CauseSearch(), base))
+    return replace(report, diagnosis=diagnosis)
 
 
 def case_of(task, inputs, **facts):

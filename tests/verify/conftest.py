@@ -37,11 +37,3 @@ def program(tmp_path_factory):
         return run
 
     return built
-
-
-@pytest.fixture(scope="session")
-def right_answers(program):
-    """Return the answers of a right program to `planted_programs.requests()`, by language."""
-    return functools.cache(
-        lambda language: planted_programs.ask(program(language), planted_programs.requests())[0]
-    )

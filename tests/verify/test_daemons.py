@@ -118,7 +118,7 @@ def test_what_the_caller_started_is_left_alone(tmp_path):
         subprocess.run([sys.executable, "-I", "-S", "-c", code], check=True)
 
     def start_on_and_on():
-        while not stop.wait(0.05):
+        while not stop.wait(0.2):
             start()
 
     def daemons():
@@ -128,7 +128,7 @@ def test_what_the_caller_started_is_left_alone(tmp_path):
     thread = threading.Thread(target=start_on_and_on)
     thread.start()
     try:
-        for _ in range(5):
+        for _ in range(2):
             contestant = open_contestant(tmp_path / "solver.py")
             assert isinstance(contestant.answer(case(2)), Answer)
             contestant.close()

@@ -239,52 +239,15 @@ def test_a_declared_method_that_is_kept_is_right(name):
 
 
 def test_an_undeclared_method_has_a_reservation_and_is_named_by_what_it_is():
-    report = judged(LocalGlobal(1), Step())
+    report = judged(Stepper(model("local_global", "y")), Step())
     assert report.verdict is Verdict.RIGHT_EXCEPT
     behaviour = str(report.diagnosis.behaviour)
     assert behaviour.startswith("It behaves like one local/global iteration from y")
     assert '"method": "local_global", "start": "y", "iterations": 1' in behaviour
 
 
-class LocalGlobal:
-    """Local/global iterations from y without dampers; the velocity may be v + h g."""
-
-    def __init__(self, iterations, is_velocity_right=True):
-        self.iterations, self.is_velocity_right = iterations, is_velocity_right
-
-    def __call__(self, masses, springs, rest_lengths, stiffnesses, pinned, gravity, positions,
-                 velocities, h):  # fmt: skip
-        """Return the new state."""
-        ends = np.zeros((len(springs), len(masses)))
-        ends[np.arange(len(springs)), springs[:, 0]] = 1.0
-        ends[np.arange(len(springs)), springs[:, 1]] = -1.0
-        free = np.setdiff1d(np.arange(len(masses)), pinned)
-        A = np.diag(masses) + h**2 * ends.T @ (stiffnesses[:, None] * ends)
-        y = positions + h * velocities
-        y[pinned] = positions[pinned]
-        x, b = y.copy(), masses[:, None] * (y + h**2 * gravity)
-        for _ in range(self.iterations):
-            d = ends @ x
-            d *= (rest_lengths / np.linalg.norm(d, axis=1))[:, None]
-            right = b + h**2 * ends.T @ (stiffnesses[:, None] * d) - A[:, pinned] @ x[pinned]
-            x[free] = np.linalg.solve(A[np.ix_(free, free)], right[free])
-        return x, (x - positions) / h if self.is_velocity_right else velocities + h * gravity
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("iterations", [1, 100])
-@pytest.mark.parametrize("is_declared", [False, True])
-def test_a_wrong_velocity_is_named_whatever_the_iterations_leave(iterations, is_declared):
-    step = Step("local_global", "y", iterations, damper="none") if is_declared else Step()
-    report = judged(LocalGlobal(iterations, is_velocity_right=False), step)
-    assert report.verdict is Verdict.WRONG
-    (explanation,) = report.diagnosis.explanations
-    assert "[PB-STEP-120] The velocity is" in str(explanation.sentence)
-    assert explanation.share == 1.0
-
-
 def test_iterations_that_end_early_are_still_named():
-    report = judged(LocalGlobal(4), Step("converged", damper="none"))
+    report = judged(Stepper(model("local_global", "y", 4)), Step("converged", damper="none"))
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
     assert explanation.codes == ("PB-STEP-168",)

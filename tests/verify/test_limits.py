@@ -11,13 +11,10 @@ from plumbob.reference.articulation import Articulation
 from plumbob.reference.skeleton import Skeleton
 from plumbob.verify.case import Case
 from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.fault_programs import coded_faults, contestant_of, source_of
-from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import inverse_kinematics, limits, problems
 from plumbob.verify.laws import HOLDS
-from plumbob.verify.verify import judge_cases
 
 TASK = problems.TASK
 GREETING = Greeting(PROTOCOL, (TASK,), methods=("ccd",), limits=True)
@@ -120,51 +117,3 @@ def test_every_start_and_every_target_is_within_limits():
         for method in limits.SWEEPS:
             local = limits.solve_within(method, case.inputs)
             assert limits.margins(local, bounds)[:, :-1].min() >= -1e-9
-
-
-@pytest.mark.slow
-def test_targets_that_another_mistake_misses_tell_nothing_about_limits():
-    clamped = coded_faults()["PB-LIMIT-002"]
-    greeting = Greeting(PROTOCOL, (TASK,), methods=("ccd",), limits=True)
-    asked = [case for case in inverse_kinematics.cases(greeting, "ccd", 0, False)
-             if "cones" in case.inputs or case.name.startswith("one sweep")]  # fmt: skip
-    program = clamped.wrong_program
-    without_root = program.replace("(parents, effector)[1:]:", "(parents, effector)[1:-1]:")
-    assert without_root != program
-    report = judge_cases(contestant_of(without_root), TASK, "ccd", asked)
-    assert not any("PB-LIMIT-002" in one.codes for one in report.diagnosis.explanations)
-    assert report.verdict is Verdict.WRONG
-
-
-def solve_by(method, kind, inputs):
-    return {"local_rotations": limits.solve_within(method, inputs).astype(kind).astype(float)}
-
-
-RIGHT = {
-    "program": lambda: contestant_of(source_of("limited ccd")),
-    "root first": lambda: contestant_of(
-        source_of("limited ccd").replace(
-            "(parents, effector)[1:]:", "(parents, effector)[:0:-1]:"
-        )
-    ),
-} | {
-    f"{method}, {precision}": functools.partial(
-        lambda method, precision, kind: FunctionContestant(
-            {"ccd": lambda **inputs: solve_by(method, kind, inputs)},
-            Greeting(PROTOCOL, (TASK,), methods=("ccd",), limits=True, precision=precision),
-        ),
-        method, precision, kind,
-    )
-    for method in ("ccd", "fabrik", "levenberg_marquardt")
-    for precision, kind in (("double", np.float64), ("single", np.float32))
-}  # fmt: skip
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("name", RIGHT)
-def test_solvers_that_keep_limits_are_not_accused(name):
-    """Stalls aside, which are another for each solver."""
-    for seed in range(2):
-        report = judge_cases(RIGHT[name](), TASK, "ccd", cases(seed))
-        assert report.verdict <= Verdict.RIGHT_EXCEPT
-        assert not report.diagnosis.explanations

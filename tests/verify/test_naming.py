@@ -3,8 +3,6 @@
 `python -m pytest tests/verify/test_naming.py -m slow -s` prints the matrix.
 """
 
-import numpy as np
-import planted_programs
 import pytest
 from planted_programs import FAULTS, IN
 
@@ -75,40 +73,3 @@ def test_right_program_is_not_accused(language, program):
     verdicts = {one.task: one.verdict for one in report.tasks}
     assert set(verdicts.values()) == {Verdict.RIGHT}
     assert not [one for task in report.tasks for one in task.diagnosis.explanations]
-
-
-# ---- what is planted shows in answers
-
-
-REQUESTS = planted_programs.requests()
-
-
-def same(a, b):
-    return a.shape == b.shape and np.allclose(a, b, rtol=0.0, atol=1e-9, equal_nan=True)
-
-
-def unlike(one, other):
-    """The tasks whose answers differ by more than rounding."""
-    found = set()
-    for request, a, b in zip(REQUESTS[1:], one[1:], other[1:], strict=True):
-        a, b = planted_programs.values(a), planted_programs.values(b)
-        if not all(same(a[name], b[name]) for name in a.keys() - {"iterations"}):
-            found.add(request["task"])
-    return found
-
-
-PLANTED = [(language, fault) for language in IN for fault in IN[language]]
-
-
-@pytest.mark.sample(every=15)
-@pytest.mark.parametrize(("language", "fault"), PLANTED)
-def test_a_planted_fault_changes_its_tasks_answers(language, fault, program, right_answers):
-    answers, _ = planted_programs.ask([*program(language), "--fault", fault], REQUESTS)
-    assert FAULTS[fault]["task"] in unlike(right_answers(language), answers)
-
-
-def test_each_program_has_twenty_faults_and_other_names_change_nothing(program, right_answers):
-    assert all(len(faults) >= 20 for faults in IN.values())
-    assert set().union(*IN.values()) == set(FAULTS)
-    answers, _ = planted_programs.ask([*program("cpp"), "--fault", "none"], REQUESTS)
-    assert not unlike(right_answers("cpp"), answers)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kinematics_solvers import explained
 
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.functions import FunctionContestant
@@ -115,29 +116,17 @@ def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
         assert found == pytest.approx(damping, abs=1e-6)
 
 
-@pytest.mark.parametrize("key", ["axes not rotated"])
-def test_a_wrong_jacobian_is_named(key):
-    fault = robot_jacobian_diagnosis.FAULTS[key]
-
-    def predict(**inputs):
-        J = next(iter(fault.jacobians(inputs, inputs["q"])))
-        return {"velocities": shortest(J, equation(inputs)[1])}
-
-    report = verify(FunctionContestant({TASK: predict}, GREETING)).tasks[0]
-    assert report.verdict is Verdict.WRONG
-    assert any(key in one.faults for one in report.diagnosis.explanations)
-
-
 def test_of_equal_explanations_that_of_the_jacobian_alone_is_named():
-    fault = robot_jacobian_diagnosis.FAULTS["arms to the last joint"]
+    fault_of_jacobian = ["arms to the last joint"]
+    fault = robot_jacobian_diagnosis.FAULTS[fault_of_jacobian[0]]
     exchanges = []
-    for case in CASES[::4]:
+    for case in CASES[::8]:
         J = next(iter(fault.jacobians(case.inputs, case.inputs["q"])))
         answer = Answer({"velocities": shortest(J, equation(case.inputs)[1])}, 0.0)
         exchanges.append(Exchange(case, answer, answer))
-    (alone,) = judge(exchanges, GREETING, "").diagnosis.explanations
+    (alone,) = explained(TASK, exchanges, GREETING).diagnosis.explanations
     assert len(alone.faults) > 1
-    (known,) = judge(exchanges, GREETING, "", ["arms to the last joint"]).diagnosis.explanations
+    (known,) = explained(TASK, exchanges, GREETING, fault_of_jacobian).diagnosis.explanations
     assert known.faults == ("arms to the last joint",)
 
 
@@ -149,6 +138,7 @@ def test_an_unknown_mistake_is_wrong_but_has_no_name():
     assert "1.3 times the right ones" in " ".join(map(str, report.diagnosis.hints))
 
 
+@pytest.mark.slow
 def test_where_the_jacobian_is_wrong_other_mistakes_have_to_explain_all():
     """Of speeds that are right for some robots only a part speaks for another mistake."""
     exchanges = []
@@ -157,6 +147,6 @@ def test_where_the_jacobian_is_wrong_other_mistakes_have_to_explain_all():
         is_turned = len(case.inputs["q"]) > 6
         answer = Answer({"velocities": shortest(J, -twist if is_turned else 1.5 * twist)}, 0.0)
         exchanges.append(Exchange(case, answer, answer))
-    likely = judge(exchanges, GREETING, "").diagnosis.explanations
+    likely = explained(TASK, exchanges, GREETING).diagnosis.explanations
     assert all(one.share < 1.0 for one in likely)
-    assert judge(exchanges, GREETING, "", ["slides not rotated"]).diagnosis.explanations == ()
+    assert explained(TASK, exchanges, GREETING, ["slides not rotated"]).diagnosis.explanations == ()
