@@ -187,7 +187,7 @@ LONG_WAY = {
 }  # fmt: skip
 
 
-@pytest.mark.sample(without=["w >= 0"])
+@pytest.mark.slow
 @pytest.mark.parametrize("way", LONG_WAY)
 def test_rotations_the_long_way_round_are_asked(way):
     report = report_of_arm(POSE, ROTATION, arm(POSE, *LONG_WAY[way]))

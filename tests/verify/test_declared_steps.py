@@ -100,7 +100,7 @@ def test_symplectic_euler_with_positions_first_is_right_if_declared(name):
     assert report.diagnosis.explanations == ()
 
 
-@pytest.mark.sample("step0")
+@pytest.mark.sample("no order")
 @pytest.mark.parametrize("step", [Step(), pytest.param(Step("symplectic"), id="no order")])
 def test_the_order_of_updates_is_recognised_and_its_declaration_told(step):
     report = judged(PositionsFirst(), step)
@@ -238,6 +238,7 @@ def test_a_declared_method_that_is_kept_is_right(name):
     assert report.diagnosis.explanations == ()
 
 
+@pytest.mark.slow
 def test_an_undeclared_method_has_a_reservation_and_is_named_by_what_it_is():
     report = judged(Stepper(model("local_global", "y")), Step())
     assert report.verdict is Verdict.RIGHT_EXCEPT

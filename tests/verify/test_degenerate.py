@@ -93,7 +93,7 @@ FABRIK = {
 }
 
 
-@pytest.mark.sample(every=4)
+@pytest.mark.sample("fabrik-causes1-NaN-float64")
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 @pytest.mark.parametrize("arithmetic", ["NaN", "exceptions"])
 @pytest.mark.parametrize(("method", "causes"), [("ccd", CCD), ("fabrik", FABRIK)])
@@ -129,6 +129,7 @@ def test_huge_numbers_are_a_reservation_in_degenerate_cases_only(method):
     assert report.verdict is RIGHT_EXCEPT
 
 
+@pytest.mark.sample("exceptions")
 @pytest.mark.parametrize(("arithmetic", "hinted"), [("NaN", True), ("exceptions", False)])
 def test_cosine_beyond_one_in_an_ordinary_case_is_broken(arithmetic, hinted):
     report = judged(INVERSE, textbook("ccd", arithmetic, clamp=2.0), "ccd")
