@@ -1,7 +1,7 @@
 """Test the judge: laws catch every known fault, the search names it, honest solvers are right.
 
-A fault is caught if a law calls an answer wrong, or if the solver is judged by less than what it is
-sent; a mere reservation (RIGHT EXCEPT) does not count.
+A fault is caught if a law calls an answer wrong, if the solver is judged by less than what it is
+sent, or if it is named beside a reservation; a mere reservation (RIGHT EXCEPT) does not count.
 """
 
 import re
@@ -21,7 +21,7 @@ from .case import Case
 from .fault_programs import coded_faults, contestant_of
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
-from .judgement import Verdict
+from .judgement import Report, Verdict
 from .kinematics.faults import FAULTS, switches
 from .kinematics.limits import solve_within
 from .kinematics.predictions import predict_forward, predict_track, solve
@@ -73,11 +73,12 @@ class Trial(NamedTuple):
     laws: frozenset[str]  # that were broken
     # whether the first explanation includes the fault; of an honest solver, whether there is none
     named: bool
+    first_verdict: Verdict | None = None  # before any cause was sought
 
     @property
     def caught(self) -> bool:
-        """Whether a law is broken."""
-        return bool(self.laws)
+        """Whether a law is broken, or the fault is named although no law is."""
+        return bool(self.laws) or (self.named and self.verdict > Verdict.RIGHT)
 
     @property
     def passed(self) -> bool:
@@ -90,7 +91,8 @@ class Trial(NamedTuple):
 def attempt(subject: Subject) -> Trial:
     """Judge a subject as `verify` judges any solver."""
     contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
-    report = verify(contestant).tasks[0]
+    published: list[Report] = []
+    report = verify(contestant, publish=published.append).tasks[0]
     laws = frozenset(
         finding.law
         for judgement in report.judgements
@@ -106,7 +108,7 @@ def attempt(subject: Subject) -> Trial:
     }
     known = {*keys, *covered, *(NUMBER.sub("", key) for key in keys)}
     is_named = subject.fault in known if subject.fault else not keys
-    return Trial(subject, report.verdict, laws, is_named)
+    return Trial(subject, report.verdict, laws, is_named, published[-1].verdict)
 
 
 # The number of one of several rules of a robot's fault, at the end of its key.

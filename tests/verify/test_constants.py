@@ -112,6 +112,7 @@ def test_declared_constants_are_no_assumption(name):
 def test_a_wrong_solver_with_constants_is_wrong(wrong, declared):
     report = judged(IK, turn_bodies(**wrong), methods=("ccd",), **declared)
     assert report.verdict is Verdict.WRONG
+    assert ("do not depend on tolerance, max_iterations" in words(report)) is not declared
 
 
 def test_other_constants_than_the_declared_ones_are_wrong():
@@ -208,7 +209,9 @@ def test_a_constant_gravity_is_asked_about_and_right_if_declared(name):
 
 
 def test_another_mistake_shows_beside_a_constant_gravity():
-    assert judged(FORCES, forces(DOWN, factor=0.5)).verdict is Verdict.WRONG
+    report = judged(FORCES, forces(DOWN, factor=0.5))
+    assert report.verdict is Verdict.WRONG
+    assert f'"fixed": {{"gravity": {DOWN}}}' in words(report)
     fixed = Fixed(gravity=tuple(DOWN))
     assert judged(FORCES, forces(DOWN, factor=0.5), fixed=fixed).verdict is Verdict.WRONG
     assert judged(FORCES, forces([0.0, -9.7, 0.0]), fixed=fixed).verdict is Verdict.WRONG
@@ -223,6 +226,35 @@ def test_forces_without_dampers_are_right_if_declared():
     wrong = forces(undamped=True, factor=0.5)
     assert judged(FORCES, wrong, step=declared).verdict is Verdict.WRONG
     assert judged(FORCES, wrong).verdict is Verdict.WRONG
+
+
+def symplectic(own_h=None, least_damping=0.0):
+    """Return symplectic Euler with an h of its own, or a damping in the place of 0."""
+
+    def function(h, pinned, dampings, **inputs):
+        h = own_h or h
+        p = problem_of({**inputs, "dampings": np.where(dampings == 0.0, least_damping, dampings)})
+        v = inputs["velocities"] + h * all_forces(p) / p.masses[:, None]
+        v[pinned] = 0.0
+        return {"positions": p.positions + h * v, "velocities": v}
+
+    return function
+
+
+def test_a_constant_h_is_asked_about_and_right_if_declared():
+    report = judged(STEP, symplectic(own_h=0.02), **SYMPLECTIC)
+    assert report.verdict is Verdict.UNDECIDED
+    assert 'declare it with "fixed": {"h": 0.02}; if not, it is a mistake' in words(report)
+    declared = judged(STEP, symplectic(own_h=0.02), fixed=Fixed(h=0.02), **SYMPLECTIC)
+    assert declared.verdict is Verdict.RIGHT
+
+
+def test_a_damping_of_zero_that_falls_back_is_said():
+    report = judged(STEP, symplectic(least_damping=1.0), **SYMPLECTIC)
+    assert report.verdict is Verdict.WRONG
+    (explanation,) = report.diagnosis.explanations
+    assert explanation.sentence.values == {"name": "dampings"}
+    assert not judged(STEP, step([0.0, -9.0, 0.0]), **SYMPLECTIC).diagnosis.explanations
 
 
 def test_chaos_of_constant_iterations_is_no_dependence_on_the_origin():

@@ -43,6 +43,12 @@ def refuse_branches(**inputs):
     return forward(inputs)
 
 
+def refuse_other_effectors(**inputs):
+    if inputs["effector"] != len(inputs["parents"]) - 1:
+        raise ValueError("it takes the last joint alone")
+    return solved()(**inputs)
+
+
 def move_points(offsets, target, tolerance, max_iterations):
     """FABRIK on points, which knows no rotations, no parents and no effector but the last."""
     x, lengths = np.cumsum(offsets, axis=0), np.linalg.norm(offsets, axis=1)
@@ -126,6 +132,7 @@ KINDS = {
     "refuses branches": (FK, refuse_branches, {"chains_only": True}),
     "chains, CCD": (IK, solved(change=chain), {"chains_only": True}),
     "last joint": (IK, solved(change=last), {"effector": "last"}),
+    "refuses other effectors": (IK, refuse_other_effectors, {"effector": "last"}),
     "points": (
         IK, move_points, {"chains_only": True, "effector": "last", "rotations": False}),
     "plane, CCD": (IK, turn_in_plane, {"planar": True}),

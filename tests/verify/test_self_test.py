@@ -41,6 +41,7 @@ def by_name():
 @pytest.mark.sweep("name", by_name, without=["robot", "steps, "], every=160)
 def test_fault_is_caught_and_named_and_honest_solver_is_right(name):
     trial = attempt(by_name()[name])
+    assert trial.verdict is trial.first_verdict  # the search for the cause has not changed it
     assert trial.passed, (trial.verdict, trial.laws, trial.named)
 
 
