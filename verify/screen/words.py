@@ -194,7 +194,7 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
     first = bad[0]
     if first.is_asked:
         return sentence("Next: declare what is meant in the greeting; correct the rest.")
-    if first.verdict is Verdict.UNDECIDED:
+    if first.verdict is Verdict.UNDECIDED and not first.diagnosis.explained:
         return (
             sentence("Next: compare your step with the nearest known one; if it is meant to be "
                      'another, declare it by "step" in the greeting (docs/protocol.md).')
