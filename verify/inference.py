@@ -47,8 +47,7 @@ class Restriction(NamedTuple):
     about: Sentence  # what it is judged on
     sentence: Sentence  # how its answers show that
     asks: bool = False  # whether it is a mistake unless the greeting declares it
-    # what shows it: a key of `_DETECTORS`
-    detection: str = "replaced"
+    detection: str = "replaced"  # what shows it, a key of `_DETECTORS`
     unused: bool = False  # whether answers do not depend on it at all
     tasks: Sequence[str] = tuple(TASKS)  # those that it is inferred of
 
