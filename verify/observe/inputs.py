@@ -10,7 +10,7 @@ from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Contestant
+from ..contestant import Answer, Contestant, is_hung
 from ..gaps import difference
 from ..greeting import Greeting
 from ..kinematics.pose_laws import read_pose
@@ -40,13 +40,18 @@ def unread_inputs(
     counts: dict[str, list[bool]] = {}
     for case in _telling(cases):
         before = contestant.answer(case)
+        if not isinstance(before, Answer):
+            continue
         for name, changed in _changes(case, greeting):
-            if isinstance(before, Answer) and _matters(case, changed, name, method):
-                if name == "tolerance" and not _arrives(case, before):
-                    continue
-                answer = contestant.answer(replace(case, inputs=changed))
-                is_same = isinstance(answer, Answer) and _are_same(before, answer)
-                counts.setdefault(name, []).append(is_same)
+            # a solve that never arrives does not show its tolerance
+            is_hidden = name == "tolerance" and not _arrives(case, before)
+            if is_hidden or not _matters(case, changed, method):
+                continue
+            answer = contestant.answer(replace(case, inputs=changed))
+            if is_hung(answer):
+                return []
+            is_same = isinstance(answer, Answer) and _are_same(before, answer)
+            counts.setdefault(name, []).append(is_same)
     return [name for name, same in counts.items() if len(same) >= MIN_CASES and all(same)]
 
 
@@ -110,7 +115,7 @@ def _is_telling(name: str, value: Any) -> bool:
     return bool(np.any(value)) or name in ("tolerance", "velocities")
 
 
-def _matters(case: Case, changed: Mapping[str, Any], name: str, method: str) -> bool:
+def _matters(case: Case, changed: Mapping[str, Any], method: str) -> bool:
     """Return whether right answers differ with the change."""
     if case.task not in _RIGHT:  # of steps each number matters, whatever the method
         return True
