@@ -20,7 +20,7 @@ from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve
 from ..kinematics.textbook import SOLVERS
 from .equalities import Equalities
-from .separation import ElementTable
+from .separation import TOLERANCE, ElementTable
 
 # Rotations by less count as none [rad]: the sine of half the angle is then about rounding.
 UNROTATED = 1e-7
@@ -255,7 +255,8 @@ def _add_pose(pose: SolvedPose, evidence: JointEvidence) -> None:
     tables["root_position"].add(pose.name, gap, whole)
     if pose.right_positions is not None:
         gap = np.abs(y - pose.right_positions)[pose.path].max() / pose.size
-        tables["pose"].add(pose.name, gap, whole)
+        allowed = TOLERANCE * pose.inputs["max_iterations"]  # rounding adds up over sweeps
+        tables["pose"].add(pose.name, gap, whole, allowed)
     if x is not None:
         links = {key: column[1:] for key, column in features.items()}
         due = np.linalg.norm(pose.offsets[1:], axis=1)
