@@ -196,17 +196,19 @@ def solve_pulls(case: SpringCase, reading: ForceReading) -> Pulls | None:
     is_measured = 3 * len(free) > count + 3
     if 3 * len(free) <= count:
         return None
-    A = np.zeros((len(free), 3, count + 3))
-    A[:, :, :count] = -incidence.T[free, None, :] * reading.u.T[None]
-    A[:, :, count:] = case.masses[free, :, None] * np.eye(3)
-    A, b = A.reshape(-1, count + 3), (reading.force - p.external)[free].ravel()
+    blocks = np.zeros((len(free), 3, count + 3))
+    blocks[:, :, :count] = -incidence.T[free, None, :] * reading.u.T[None]
+    blocks[:, :, count:] = case.masses[free, :, None] * np.eye(3)
+    A: FloatArray = blocks.reshape(-1, count + 3)
+    b = (reading.force - p.external)[free].ravel()
     if not is_measured:  # too few equations: take gravity from the request
         A, b = A[:, :count], b - (case.masses * case.gravity)[free].ravel()
     size = float(np.abs(b).max())
     allowed = max(TOLERANCE * size, case.rounding())
     if allowed > MAX_ROUNDING * size:
         return None
-    solution, _, rank, _ = np.linalg.lstsq(A, b, INDEPENDENT)
+    least_squares, _, rank, _ = np.linalg.lstsq(A, b, INDEPENDENT)
+    solution: FloatArray = np.asarray(least_squares, dtype=float)
     if rank < A.shape[1] or not np.abs(A @ solution - b).max() <= allowed:
         return None
     features = {
