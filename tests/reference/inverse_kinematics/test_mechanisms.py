@@ -124,9 +124,9 @@ def test_fixed_joints_are_parts_of_their_links(rng, solver, backend):
 @at_both_speeds
 @with_examples
 @given(**TREES)
-def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, any_solver, kinds, seed):
+def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, solver, backend, kinds, seed):
     model, q, targets = problem(kinds, seed)
-    solution = solve_ik(model, q, targets, any_solver, max_iterations=5)
+    solution = solve_ik(model, q, targets, solver, max_iterations=5)
     pose = forward_kinematics(model, solution.coordinates)
     np.testing.assert_allclose(solution.positions, pose.positions, rtol=0, atol=ROUNDING)
     _, local = model.local_transforms(solution.coordinates)
@@ -143,10 +143,10 @@ def test_the_answer_is_forward_kinematics_of_its_coordinates(problem, any_solver
 @with_examples
 @given(**TREES)
 def test_limits_are_kept_and_other_joints_left_or_brought_within(
-    problem, moving_joints, any_solver, kinds, seed
+    problem, moving_joints, solver, backend, kinds, seed
 ):
     model, q, targets = problem(kinds, seed)
-    found = solve_ik(model, q, targets, any_solver, max_iterations=5).coordinates
+    found = solve_ik(model, q, targets, solver, max_iterations=5).coordinates
     assert model.within_limits(found, LIMIT).all()
     clamped, moving = model.clamp(q), moving_joints(model, targets)
     for j in set(range(len(kinds))) - set(model.mimics) - moving:
