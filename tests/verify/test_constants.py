@@ -137,7 +137,7 @@ def follow(solver):
     )
 
 
-@pytest.mark.sample("fabrik")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["fabrik", "library"])
 def test_tracks_with_a_constant_tolerance(name):
     solver, method, _ = SOLVERS[name]

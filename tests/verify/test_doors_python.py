@@ -205,7 +205,7 @@ def three_joints(body):
     return f"import helper\n{FORWARD}if len(parents) == 3:\n        {body}\n    return offsets\n"
 
 
-@pytest.mark.sample("iter(int", "os.kill")
+@pytest.mark.sample("os.kill")
 @rows("survives")
 def test_a_process_survives_or_is_started_anew(solver, body, message):
     contestant = solver(three_joints(body), helper="def deep(x):\n    return 1 / x\n")
@@ -230,7 +230,7 @@ def test_an_argument_that_no_input_has_is_told_with_those_there_are(inside, argu
     assert re.search(message, said), said
 
 
-@pytest.mark.sample(every=2)
+@pytest.mark.sample(every=3)
 @rows("prints")
 def test_prints_do_no_harm_and_are_remarked(solver, body, remarked):
     contestant = solver(f"import os, sys\n{FORWARD}{body}\n    return offsets\n")

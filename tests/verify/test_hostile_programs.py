@@ -79,7 +79,7 @@ def check(folder, failures, row):
     assert not running(folder)
 
 
-@pytest.mark.sample(without=["a format", "closes all", "forks and ends"], every=2)
+@pytest.mark.sample(without=["a format", "closes all", "forks and ends"], every=3)
 @pytest.mark.parametrize("name", HOSTILE)
 def test_each_has_its_sentence_and_the_next_case_works(outcomes, name):
     folder, future = outcomes[ask, name]

@@ -181,7 +181,7 @@ def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
     assert {name for name in known if f'"{name}"' in text} - {"system", "methods"} == fields.keys()
 
 
-@pytest.mark.sample("one mass")
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["chains, CCD", "one mass"])
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_declared_restriction_needs_no_inference(kind):

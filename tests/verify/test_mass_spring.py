@@ -111,6 +111,7 @@ def test_the_dense_step_is_the_reference_s(name):
         )
 
 
+@pytest.mark.sample("step")
 @pytest.mark.parametrize("task", ["mass_spring_step", "mass_spring_motion"])
 def test_a_solution_is_reproduced_from_itself_and_others_are_told_apart(task):
     compared = 0

@@ -42,7 +42,7 @@ def is_named(report, fault):
     return FAULTS[fault].get("name") in first_names(report)
 
 
-@pytest.mark.sample("forces_damping_sign")
+@pytest.mark.sample("fk_local")
 @pytest.mark.parametrize(("language", "fault"), SOME)
 def test_a_planted_fault_is_named(language, fault, program):
     report = judged(program(language), fault)
