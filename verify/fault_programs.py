@@ -39,6 +39,8 @@ PROGRAMS: Mapping[str, Any] = dict(
 )
 FAMILIES: Mapping[str, Any] = _TABLE["families"]
 NOTES: Mapping[str, Any] = _TABLE["notes"]
+# The names of the programs with a dictionary of answers, by task or method.
+IN_DICTIONARY: Mapping[str, Any] = _TABLE["dictionary"]
 
 
 class CodedFault(NamedTuple):

@@ -11,7 +11,7 @@ from plumbob.verify.dictionary.build import digest
 from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, read
 from plumbob.verify.dictionary.look_up import UNSTEADY, look_up
 from plumbob.verify.dictionary.requests import FK, TASKS, keys, requests
-from plumbob.verify.fault_programs import coded_faults, source_of
+from plumbob.verify.fault_programs import IN_DICTIONARY, coded_faults, source_of
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.one_line.mutants import Program
@@ -26,7 +26,7 @@ EVERY = 100
 
 def recomputed(entry, task, method):
     """Return the keys of an entry, as its program answers now."""
-    program, base = entry.changed_program(), Program(source_of(TASKS[task, method]))
+    program, base = entry.changed_program(), Program(source_of(IN_DICTIONARY[method or task][0]))
     rows = []
     for case in requests(task, method):
         with np.errstate(all="ignore"), program.within(100):
@@ -86,7 +86,7 @@ class Solver(FunctionContestant):
 
 
 def proposals(solver, precision="double"):
-    return look_up(solver, FK, "", solver.greeting, precision)
+    return look_up(solver, FK, "", Greeting(PROTOCOL, (FK,), precision=precision))
 
 
 FAULT = "PB-FK-002"
@@ -113,10 +113,10 @@ def test_nothing_is_looked_up_for_answers_that_differ():
     assert (result.entries, result.hint) == ((), UNSTEADY)
 
 
-@pytest.mark.parametrize("restriction", [{"planar": True}, {"rotations": False}])
+@pytest.mark.parametrize("restriction", [{"planar": True}, {"rotations": False}, {"limits": True}])
 def test_a_restricted_solver_has_no_dictionary(restriction):
     greeting = Greeting(PROTOCOL, (FK,), **restriction)
-    assert look_up(Solver(source_of("forward kinematics")), FK, "", greeting, "double") is None
+    assert look_up(Solver(source_of("forward kinematics")), FK, "", greeting) is None
 
 
 def test_a_second_mistake_in_another_request_hides_no_first():

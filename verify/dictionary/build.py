@@ -13,11 +13,11 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
-from ..fault_programs import PROGRAMS, source_of
+from ..fault_programs import IN_DICTIONARY, source_of
 from ..one_line.mutants import Program
-from ..one_line.right_programs import answer_of, faults_in, is_of
+from ..one_line.right_programs import answer_of, faults_in
 from .entry import Dictionary, Entry, likelihood
-from .requests import FK, OUTPUTS, TASKS, fractions, keys, requests
+from .requests import FK, OUTPUTS, fractions, keys, requests
 
 # Differences of keys above this tell answers apart, the shortest distance of a look-up.
 DISTINCT = 1e-6
@@ -34,28 +34,18 @@ IN_FORMS = {"conjugate", "cross", "product", "product_of_vectors", "by_cross", "
 
 def digest(task: str, method: str) -> str:
     """Return a digest of the programs, the lines of faults and the requests."""
-    names = programs_of(task, method)
+    names = IN_DICTIONARY[method or task]
     parts: list[Any] = [(name, source_of(name)) for name in names]
     parts += [fault.lines for name in names for fault in faults_in(source_of(name), task, method)]
     parts += [[np.ravel(v).tolist() for v in c.inputs.values()] for c in requests(task, method)]
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
-def programs_of(task: str, method: str) -> list[str]:
-    """Return the names of the programs without limits of a task and a method.
-
-    Those that differ from another one in a few texts alone have nearly the same changes.
-    """
-    names = [name for name in PROGRAMS if is_of(name, task, method)]
-    names = [n for n in names if "forms" in PROGRAMS[n] or "file" not in PROGRAMS[n]]
-    return [name for name in names if "def within(" not in source_of(name)]
-
-
 @np.errstate(all="ignore")  # changed programs divide by zero
 def build(task: str, method: str, notify: Callable[[str], None] = lambda text: None) -> Dictionary:
     """Return the dictionary of a task and a method."""
-    cases, names = requests(task, method), programs_of(task, method)
-    base = Program(source_of(TASKS[task, method]))
+    cases, names = requests(task, method), IN_DICTIONARY[method or task]
+    base = Program(source_of(names[0]))
     right = [answer_of(base, method, case) for case in cases]
     classes, functions = dict[bytes, list[tuple[Entry, FloatArray]]](), set[str]()
     for name in names:
@@ -121,7 +111,7 @@ def _codes(name: str, task: str, method: str) -> Iterator[tuple[str, ...]]:
     """Yield the known faults of a program, of forward kinematics also two at once."""
     codes = [fault.code for fault in faults_in(source_of(name), task, method)]
     yield from ((code,) for code in codes)
-    if task == FK and name == TASKS[task, ""]:
+    if task == FK and name == IN_DICTIONARY[FK][0]:
         yield from combinations(codes, 2)
 
 

@@ -10,7 +10,7 @@ from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
-from ..fault_programs import source_of
+from ..fault_programs import IN_DICTIONARY, source_of
 from ..gaps import difference
 from ..greeting import Greeting
 from ..one_line.mutants import Program
@@ -37,9 +37,7 @@ class Proposals(NamedTuple):
     hint: Sentence | None = None  # why nothing is looked up
 
 
-def look_up(
-    contestant: Contestant, task: str, method: str, greeting: Greeting, precision: str
-) -> Proposals | None:
+def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) -> Proposals | None:
     """Return the changes that a new process of a solver answers like, None without a dictionary.
 
     Each request is looked up alone as well: a second mistake may hide the first in another.
@@ -52,9 +50,10 @@ def look_up(
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
         return Proposals(hint=UNSTEADY)
+    tolerance = TOLERANCES[greeting.precision]
     ranks, is_wrong = list[tuple[int, Entry]](), False
     for own in methods:
-        base, tolerance = Program(source_of(TASKS[task, own])), TOLERANCES[precision]
+        base = Program(source_of(IN_DICTIONARY[own or task][0]))
         names = [case.name for case in requests(task, method)]
         rows = np.full((len(names), 2), np.nan)
         for case, answer in zip(cases, first, strict=True):

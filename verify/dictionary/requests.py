@@ -19,8 +19,8 @@ from ..kinematics.problems import facts
 from ..kinematics.skeletons import suits
 
 FK, IK = "forward_kinematics", "inverse_kinematics"
-# The first right program of each task and method that has a dictionary.
-TASKS = {(FK, ""): "forward kinematics", (IK, "ccd"): "ccd", (IK, "fabrik"): "fabrik"}
+# The tasks and methods with a dictionary.
+TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
 # Parents, effector and target of each: a tree with an inner effector, and a chain.
 SKELETONS = (
@@ -53,8 +53,8 @@ def requests(task: str, method: str) -> list[Case]:
 
 
 def suitable(case: Case, greeting: Greeting) -> bool:
-    """Return whether a solver takes a request: none in a plane, without rotations or with units."""
-    is_free = greeting.rotations and not greeting.planar
+    """Return whether a solver takes a request: free joints, which rotate in space."""
+    is_free = greeting.rotations and not (greeting.planar or greeting.limits)
     return is_free and suits(case.inputs["parents"], greeting, case.inputs.get("effector"))
 
 

@@ -15,9 +15,9 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
 from ..dictionary.entry import Entry
-from ..dictionary.look_up import look_up
+from ..dictionary.look_up import Proposals, look_up
 from ..explain import MORE, Variant, explain, together
-from ..fault_programs import NOTES, CodedFault, coded_faults, source_of
+from ..fault_programs import IN_DICTIONARY, NOTES, CodedFault, coded_faults, source_of
 from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
@@ -73,7 +73,13 @@ def with_changed_line(
         if named or not doubtful:
             return report
         share = 1.0
-    explanations = changed_lines(report, greeting, doubtful, is_known, contestant)
+    proposals = None
+    if contestant is not None and report.verdict >= Verdict.WRONG:
+        proposals = look_up(contestant, report.task, report.method, greeting)
+        if proposals is not None and proposals.hint is not None:
+            hints = (*report.diagnosis.hints, proposals.hint)
+            return replace(report, diagnosis=replace(report.diagnosis, hints=hints))
+    explanations = changed_lines(report, greeting, doubtful, is_known, proposals)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -121,32 +127,32 @@ def changed_lines(
     greeting: Greeting,
     doubtful: Sequence[CaseJudgement] = (),
     is_known: bool = False,
-    contestant: Contestant | None = None,
+    proposals: Proposals | None = None,
 ) -> tuple[Explanation, ...]:
     """Return the change of a line that gives most wrong or doubtful answers, () if too few.
 
-    If `is_known`, the search is for known faults alone. What a dictionary has is looked up.
+    If `is_known`, the search is for known faults alone. Programs with a dictionary are changed as
+    it proposes, the others in all lines.
     """
     compared = _compared(report, doubtful)
     if not compared:
         return ()
-    precision = judging_greeting(compared, greeting)[0].precision
-    tolerance = TOLERANCE[precision]
+    tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     best, functions = tuple[Explanation, ...](), set[str]()
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
-    if contestant is not None and not doubtful and not has_limits:
-        proposals = look_up(contestant, report.task, report.method, greeting, precision)
-        if proposals is not None and proposals.is_wrong:
-            entries = [entry for entry in proposals.entries if entry.codes or not is_known]
-            return _of_entries(entries, report, compared, tolerance)
     programs = [
         program
         for program in programs_of(report.task, report.method, greeting.step)
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
+    if proposals is not None and proposals.is_wrong:
+        entries = [entry for entry in proposals.entries if entry.codes or not is_known]
+        best = _of_entries(entries, report, compared, tolerance)
+        looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
+        programs = [program for program in programs if program.source not in looked_up]
     if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
-    for program in programs:
+    for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()
         explanations = _of_program(
