@@ -26,7 +26,7 @@ from .separation import TOLERANCE, ElementTable
 UNROTATED = 1e-7
 # What holds of one sweep alone, and means nothing if a solver makes another number.
 OF_ONE_SWEEP = ("turn", "point")
-EQUALITIES_OF_ONE_SWEEP = ("half_turn", "wrong_axis")
+EQUALITIES_OF_ONE_SWEEP = ("half_turn", "double_turn", "wrong_axis")
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -57,6 +57,7 @@ def joint_features(inputs: Mapping[str, Any]) -> dict[str, BoolArray]:
         "child_of_root": parents == 0,
         "branching": children > 1,
         "last_joint": indices == joints - 1,
+        "after_branch": (parents != indices - 1) & (indices > 0),
     }
     if "effector" in inputs:
         effector = int(inputs["effector"])
@@ -345,6 +346,7 @@ def _add_turns(
     miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
     for key, gaps, right_gaps in (
         ("half_turn", np.abs(turned - need / 2.0), need / 2.0),
+        ("double_turn", np.abs(turned - np.pi + np.abs(np.pi - 2.0 * need)), need),
         ("wrong_axis", np.abs(turned - need), miss),
     ):
         evidence.equalities.add(key, pose.name, gaps, right_gaps)
