@@ -53,7 +53,8 @@ def judged_some(task, function, method="", every=5):
 
 def explained(task, exchanges, greeting, base=None):
     """Return the report on answers with the faults that explain them."""
-    report = DISCIPLINES[task].judge(exchanges, greeting, "")
+    verdict = DISCIPLINES[task].judge(exchanges, greeting, "")
+    report = replace(verdict, exchanges=exchanges, greeting=greeting)
     diagnosis = DISCIPLINES[task].diagnose(JudgedAnswers(report, greeting, CauseSearch(), base))
     return replace(report, diagnosis=diagnosis)
 

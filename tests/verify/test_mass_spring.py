@@ -223,13 +223,13 @@ def test_where_to_look_is_told_only_if_the_cases_before_are_right(first, family)
         finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence("It is off."))
         return CaseJudgement(case, Answer({}, 0.0), (finding,), {})
 
-    told = str(stepping._first_broken([
+    told = str(stepping.first_broken_step([
         judged("one", "flight", first), judged("two", family, Verdict.WRONG),
         judged("three", "cloth", Verdict.WRONG),
     ]))  # fmt: skip
     assert "in the case 'two': It is off." in told
     assert (str(trace_of(family)) in told) is (first is not Verdict.UNDECIDED)
-    assert stepping._first_broken([judged("one", "flight", first)]) is None
+    assert stepping.first_broken_step([judged("one", "flight", first)]) is None
 
 
 @pytest.mark.slow
@@ -472,7 +472,7 @@ def test_pins_are_looked_at_where_nothing_else_is_wrong(pins, words):
         case = Case(name, "mass_spring_step", inputs, family, sentence("It is all."))
         broken = Finding("law", Verdict.WRONG, 1.0, 0.0, "m", sentence("Off."))
         judgements.append(CaseJudgement(case, Answer({}, 0.0), (broken,), {}, None, 0.0))
-    assert words in str(stepping._first_broken(judgements))
+    assert words in str(stepping.first_broken_step(judgements))
 
 
 GRADIENTS = """

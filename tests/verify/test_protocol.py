@@ -149,7 +149,7 @@ def test_the_page_says_every_limit_of_a_greeting():
     table = PAGE.split("beyond these limits is refused.")[1].split("\n## ")[0].splitlines()
     parts = {name: SCHEMA["$defs"][name] for name in ("greeting", "System", "Step", "Fixed")}
     limits = list(limits_of(parts))
-    assert len(limits) == 9
+    assert len(limits) == 10
     for name, most, reason in limits:
         assert any(f"`{name}`" in row and f"{most}" in row and reason in row for row in table), name
     assert f"and {MOST_ITERATIONS} iterations in all substeps" in PAGE

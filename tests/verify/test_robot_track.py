@@ -165,13 +165,13 @@ def test_a_joint_that_moves_a_radian_while_its_target_rests_jumps(move, is_jump)
     assert ("no jumps" in broken(case, moved)) == is_jump
 
 
-@pytest.mark.parametrize(("explained", "is_named"), [(12, True), (11, False)])
-def test_a_fault_that_explains_half_of_the_frames_is_named(explained, is_named, monkeypatch):
+@pytest.mark.parametrize(("count", "is_named"), [(12, True), (11, False)])
+def test_a_fault_that_explains_half_of_the_frames_is_named(count, is_named, monkeypatch):
     """Of 24 frames, all of which it concerns."""
     frames = np.arange(24)
 
     def signature(motion, laws):
-        return motion_faults.Evidence(frames >= 0, frames < explained)
+        return motion_faults.Evidence(frames >= 0, frames < count)
 
     tier = motion_faults.Tier({"single step": signature})
     monkeypatch.setattr(motion_faults, "TIERS", (tier,))

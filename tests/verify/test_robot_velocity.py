@@ -116,6 +116,7 @@ def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
         assert found == pytest.approx(damping, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_of_equal_explanations_that_of_the_jacobian_alone_is_named():
     fault_of_jacobian = ["arms to the last joint"]
     fault = robot_jacobian_diagnosis.FAULTS[fault_of_jacobian[0]]
