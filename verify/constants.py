@@ -172,13 +172,13 @@ def step_length(contestant: Contestant, report: TaskReport) -> float | None:
     if case is None:
         return None
     x = case.inputs["positions"]
-    ends = [
-        _outputs(contestant, case, {"velocities": np.full_like(x, speed)}).get("positions")
-        for speed in (0.0, 1.0)
+    answers = [
+        _outputs(contestant, case, {"velocities": np.full_like(x, speed)}) for speed in (0.0, 1.0)
     ]
-    if any(end is None for end in ends):
+    if not all("positions" in answer for answer in answers):
         return None
-    h = float(np.diff([end.reshape(-1, *x.shape)[0, 0, 0] for end in ends])[0])
+    ends = [answer["positions"].reshape(-1, *x.shape)[0, 0, 0] for answer in answers]
+    h = float(ends[1] - ends[0])
     return float(f"{h:.6g}") if 0.0 < h <= LONGEST else None
 
 

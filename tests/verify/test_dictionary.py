@@ -142,5 +142,5 @@ def test_cases_decide_what_is_named(factor):
 
 
 def test_a_changed_line_says_how_many_are_equal():
-    counts = [entry.count for entry in dictionary_of(FK, "").entries]
+    counts = [entry.equal_count for entry in dictionary_of(FK, "").entries]
     assert max(counts) > 1

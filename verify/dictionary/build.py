@@ -72,11 +72,11 @@ def build(task: str, method: str, notify: Callable[[str], None] = lambda text: N
 
 def _add(equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray) -> None:
     """Add an entry to those that answer alike, the likeliest of which remain."""
-    count = (equal[0][0].count if equal else 0) + (len(entry.codes) < 2)
+    count = (equal[0][0].equal_count if equal else 0) + (len(entry.codes) < 2)
     if all(entry[:6] != other[:6] for other, _ in equal):
         equal.append((entry, row))
     equal.sort(key=lambda pair: likelihood(pair[0]))
-    equal[:] = [(other._replace(count=count), row) for other, row in equal[:EQUAL]]
+    equal[:] = [(other._replace(equal_count=count), row) for other, row in equal[:EQUAL]]
 
 
 Run = Callable[[Case], Mapping[str, Any]]

@@ -26,7 +26,7 @@ class Entry(NamedTuple):
     right: str = ""  # the line
     wrong: str = ""  # the line in its place
     text: str = ""  # the changed function
-    count: int = 1  # of the changed lines that answer alike
+    equal_count: int = 1  # of the changed lines that answer alike
 
     def changed_program(self) -> Program:
         """Return the program with the change; raise ValueError or SyntaxError if it has no place.

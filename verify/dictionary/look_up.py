@@ -84,8 +84,8 @@ def _matches(dictionary: Dictionary, rows: FloatArray, tolerance: float) -> list
     answered = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
         gaps = np.abs(dictionary.keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
-        is_wrong = (np.abs(rows) > tolerance).any(axis=1)
-    is_alike = (gaps | ~answered).all(axis=2)
-    every, single = is_alike.all(axis=1), (is_alike & is_wrong).any(axis=1)
+        is_wrong = np.any(np.abs(rows) > tolerance, axis=1)
+    is_alike = np.all(gaps | ~answered, axis=2)
+    every, single = np.all(is_alike, axis=1), np.any(is_alike & is_wrong, axis=1)
     numbers = np.flatnonzero((every | single) & is_wrong.any())
     return [(int(not every[i]), dictionary.entries[i]) for i in numbers]

@@ -263,7 +263,7 @@ def _of_changes(
 
     def describe(keys: Sequence[str]) -> Sentence:
         if not changes[keys[0]].codes:
-            return _describe(changes, keys, changes[keys[0]].count)
+            return _describe(changes, keys, changes[keys[0]].equal_count)
         faults = [coded_faults()[code] for code in changes[keys[0]].codes]
         return together([with_code(fault.code, fault.sentence) for fault in faults])
 
