@@ -56,7 +56,7 @@ COMMANDS = {
     "files": ["check", "--files", "arm.urdf"],
     "blocks of all suites": ["bench", "--list"],
     "bench of claims": [*BENCH, "check", *CHECKED],
-    "bench": [*BENCH, "ik", "--problem", "robots/ur5", "--solver", "ccd"],
+    "bench": [*BENCH, "ik", "--problem", "robots/ur5", "--solver", "Plumbob LM"],
     "report": ["report", "out"],
 }
 
