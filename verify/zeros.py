@@ -8,7 +8,7 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 
-from .contestant import Answer, Contestant
+from .contestant import Answer, Contestant, is_hung
 from .examination import Examination
 from .gaps import largest_gap
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
@@ -25,6 +25,8 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     """Return the report on wrong answers that are right with almost zero in the place of zero."""
     wrong = [j for j in report.judgements if j.verdict >= Verdict.UNDECIDED]
     if report.verdict < Verdict.UNDECIDED or report.original is not None:
+        return report
+    if any(is_hung(j.answer) or not _is_steady(j) for j in wrong):
         return report
     for name in NAMES:
         concerned = [j for j in wrong if _has_zeros(j, name)]
@@ -43,6 +45,12 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         )  # fmt: skip
         return replace(report, diagnosis=diagnosis)
     return report
+
+
+def _is_steady(judgement: CaseJudgement) -> bool:
+    """Return whether equal requests got equal answers."""
+    laws = {finding.law for finding in judgement.findings if finding.verdict >= Verdict.WRONG}
+    return "equal answers" not in laws
 
 
 def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
