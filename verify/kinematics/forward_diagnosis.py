@@ -14,12 +14,12 @@ from .fault_search import diagnosis_of
 from .report import with_hints
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the poses, if some are wrong."""
-    pairs = zip(judged.exchanges, judged.report.judgements, strict=True)
+    pairs = zip(judged_answers.exchanges, judged_answers.report.judgements, strict=True)
     wrong = [exchange for exchange, j in pairs if j.verdict > Verdict.RIGHT_EXCEPT]
-    diagnosis = _diagnosis(judged.exchanges, wrong, judged.greeting)
-    return with_hints(judged.report.judgements, diagnosis)
+    diagnosis = _diagnosis(judged_answers.exchanges, wrong, judged_answers.greeting)
+    return with_hints(judged_answers.report.judgements, diagnosis)
 
 
 def _diagnosis(

@@ -27,12 +27,12 @@ MAX_FAULTS = 3
 LIMITS = sentences_of("limits")
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the poses, or the sweeps of poses that are right."""
-    limited, unlimited = split(judged.exchanges)
-    greeting, method = judged.greeting, judged.report.method
+    limited, unlimited = split(judged_answers.exchanges)
+    greeting, method = judged_answers.greeting, judged_answers.report.method
     trials, comparison = judged_trials(unlimited, greeting, method)
-    base = judged.base or ()
+    base = judged_answers.base or ()
     if not method and not comparison.method and not sweeps.idle(trials):
         comparison = _suspicion(trials, greeting, base)
     diagnosis = _diagnosis(trials, comparison, greeting, base)
@@ -48,7 +48,7 @@ def diagnose(judged: JudgedAnswers) -> Diagnosis:
         _, key = limits.judge(limited, greeting, True)
         reading = [Explanation((key,), LIMITS[key], 1.0, 0.0)] if key else []
         diagnosis = replace(diagnosis, explanations=(*diagnosis.explanations, *reading))
-    return with_hints(judged.report.judgements, diagnosis)
+    return with_hints(judged_answers.report.judgements, diagnosis)
 
 
 def _suspicion(

@@ -18,15 +18,18 @@ from .resample_faults import FAULTS
 from .resampling import even_points
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the points, if some are wrong."""
-    judgements, behaviour = judged.report.judgements, judged.report.diagnosis.behaviour
-    pairs = zip(judged.exchanges, judgements, strict=True)
+    judgements, behaviour = (
+        judged_answers.report.judgements,
+        judged_answers.report.diagnosis.behaviour,
+    )
+    pairs = zip(judged_answers.exchanges, judgements, strict=True)
     wrong_first = sorted(pairs, key=lambda pair: pair[1].verdict is Verdict.RIGHT)
     diagnosis = Diagnosis(behaviour=behaviour)
     if any(judgement.verdict and isinstance(judgement.answer, Answer) for judgement in judgements):
         ordered = [exchange for exchange, _ in wrong_first]
-        diagnosis = _diagnosis(ordered, judged.greeting, behaviour)
+        diagnosis = _diagnosis(ordered, judged_answers.greeting, behaviour)
     return with_hints(judgements, diagnosis)
 
 

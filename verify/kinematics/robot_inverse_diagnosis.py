@@ -16,13 +16,13 @@ from .robot_targets import FEW, MOST
 from .trajectories import Trajectory, trajectories
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the coordinates, likely those of the Jacobian."""
-    judgements = judged.report.judgements
-    motions = trajectories(judged.exchanges, trajectory_of)
-    diagnosis = _diagnosis(judgements, motions, judged.base)
+    judgements = judged_answers.report.judgements
+    motions = trajectories(judged_answers.exchanges, trajectory_of)
+    diagnosis = _diagnosis(judgements, motions, judged_answers.base)
     if not diagnosis.explained:
-        diagnosis = replace(diagnosis, behaviour=judged.report.diagnosis.behaviour)
+        diagnosis = replace(diagnosis, behaviour=judged_answers.report.diagnosis.behaviour)
     return with_hints(judgements, diagnosis)
 
 

@@ -42,16 +42,20 @@ FAULTS: Mapping[str, RobotFault] = {
 }
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the Jacobians, if some are wrong."""
-    judgements, diagnosis = judged.report.judgements, Diagnosis()
+    judgements, diagnosis = judged_answers.report.judgements, Diagnosis()
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
-        _, matches = best_convention(judged.exchanges, judged.greeting)
+        _, matches = best_convention(judged_answers.exchanges, judged_answers.greeting)
         wrong, right = (
-            [exchange for exchange in judged.exchanges if matches.get(exchange.case.name) is value]
+            [
+                exchange
+                for exchange in judged_answers.exchanges
+                if matches.get(exchange.case.name) is value
+            ]
             for value in (False, True)
         )
-        diagnosis = _diagnosis(wrong, right, judged.greeting)
+        diagnosis = _diagnosis(wrong, right, judged_answers.greeting)
     return with_hints(judgements, diagnosis)
 
 

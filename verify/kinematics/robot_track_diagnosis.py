@@ -13,11 +13,11 @@ from .robot_track import NO_DRIFT, motion_of, speed_ratios
 from .trajectories import Trajectory, trajectories
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the motions, likely those of the Jacobian."""
-    judgements = judged.report.judgements
-    motions = trajectories(judged.exchanges, motion_of)
-    diagnosis = motion_faults.diagnosis_of(judgements, motions, judged.base)
+    judgements = judged_answers.report.judgements
+    motions = trajectories(judged_answers.exchanges, motion_of)
+    diagnosis = motion_faults.diagnosis_of(judgements, motions, judged_answers.base)
     if not diagnosis.explanations and (keys := _too_fast(motions)):
         explanation = Explanation(keys, motion_faults.SENTENCES[keys[0]], 1.0, 0.0)
         diagnosis = replace(diagnosis, explanations=(explanation,))

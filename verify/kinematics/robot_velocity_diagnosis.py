@@ -73,11 +73,11 @@ POINTS = [
 ]
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain wrong speeds, likely those of the Jacobian."""
-    judgements, base, diagnosis = judged.report.judgements, judged.base, Diagnosis()
+    judgements, base, diagnosis = judged_answers.report.judgements, judged_answers.base, Diagnosis()
     if any(judgement.verdict >= Verdict.WRONG for judgement in judgements):
-        diagnosis = _diagnosis(judgements, judged.greeting)
+        diagnosis = _diagnosis(judgements, judged_answers.greeting)
         likely = [_of_base(e, base or ()) for e in diagnosis.explanations
                   if base is None or e.share == 1.0 or set(e.faults) & set(base)]  # fmt: skip
         diagnosis = replace(diagnosis, explanations=tuple(likely))

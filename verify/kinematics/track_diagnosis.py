@@ -22,10 +22,14 @@ from .report import with_hints
 from .track import CONTINUES, TOLERANCE, Frame, as_poses, frames_of, prediction_bound
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the motions, likely those of the inverse kinematics."""
-    exchanges, greeting, base = judged.exchanges, judged.greeting, judged.base or ()
-    judgements, method = judged.report.judgements, judged.report.method
+    exchanges, greeting, base = (
+        judged_answers.exchanges,
+        judged_answers.greeting,
+        judged_answers.base or (),
+    )
+    judgements, method = judged_answers.report.judgements, judged_answers.report.method
     comparable = {e.case.name: as_poses(e) for e in exchanges if frames_of(e)}
     wrong = [
         comparable[judgement.case.name]

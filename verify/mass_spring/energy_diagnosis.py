@@ -37,9 +37,9 @@ MAX_EXPLANATIONS = 3
 FITTED = 8
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the energies, if some are wrong."""
-    judgements, epsilon = judged.report.judgements, judged.greeting.epsilon
+    judgements, epsilon = judged_answers.report.judgements, judged_answers.greeting.epsilon
     answers = [
         (problem_of(judgement.case.inputs), judgement.answer.values)
         for judgement in judgements

@@ -79,9 +79,13 @@ def variants(
         yield Variant(keys, partial(_predict, faults, problems), is_special)
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults that explain the forces, if some are wrong."""
-    judgements, exchanges, greeting = judged.report.judgements, judged.exchanges, judged.greeting
+    judgements, exchanges, greeting = (
+        judged_answers.report.judgements,
+        judged_answers.exchanges,
+        judged_answers.greeting,
+    )
     wrong = [judgement.verdict >= Verdict.WRONG for judgement in judgements]
     if not any(wrong):
         return Diagnosis()

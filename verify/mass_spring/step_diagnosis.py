@@ -52,15 +52,19 @@ LARGER = 2
 MANY, SOME = 0.7, 0.3
 
 
-def diagnose(judged: JudgedAnswers) -> Diagnosis:
+def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     """Return the faults of a step, or of its iterations, that explain the answers."""
-    exchanges, greeting, cause_search = judged.exchanges, judged.greeting, judged.search
+    exchanges, greeting, cause_search = (
+        judged_answers.exchanges,
+        judged_answers.greeting,
+        judged_answers.search,
+    )
     problems, step, epsilon = problems_of(exchanges, greeting), greeting.step, greeting.epsilon
     telling, probes = (
         telling_probes(exchanges, problems),
         probes_of(exchanges, problems, every=True),
     )
-    judgements, matches = judged.report.judgements, list[ModelMatch]()
+    judgements, matches = judged_answers.report.judgements, list[ModelMatch]()
     search = FaultSearch(telling, greeting, cause_search)
     honest_search = ModelSearch(telling, greeting)
 
