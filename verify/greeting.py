@@ -1,7 +1,6 @@
-"""What a solver says of itself: its tasks, its precision, and the model it declares to follow.
+"""The greeting of a solver: its tasks, its precision, and its declared model.
 
-A solver is judged first against what it declares. What it leaves out (None) is inferred from its
-answers.
+A solver is judged first by its declarations. Fields left out (None) are inferred from its answers.
 """
 
 from typing import Annotated, Literal
@@ -49,7 +48,7 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         substeps: how many equal steps make up h.
         damper: none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity:
             the force of the velocities at the end; global_factor: every velocity is scaled.
-        damping_factor: what global_factor multiplies velocities by after each substep.
+        damping_factor: the factor of global_factor for velocities after each substep.
         pins: eliminated from the unknowns, overwritten after the solve, held by a penalty, or
             heavy.
         velocity: displacement: (x' - x_n) / h; separate: integrated beside the positions.
@@ -74,13 +73,13 @@ class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Which mass-spring systems and states a solver takes.
 
     Attributes:
-        masses, stiffnesses, dampings: one for all, or one each.
-        rest_lengths: given, one for all, or measured by the solver in `rest_positions`.
+        masses, stiffnesses, dampings: a number for all, or a number each.
+        rest_lengths: given, a number for all, or measured by the solver in `rest_positions`.
         gravity: any vector, or a single number g, downwards along y.
         external_forces: whether it takes them.
         tension_only: whether it knows springs that resist no compression.
         pinned: whether it can pin particles.
-        state: by velocities, or by the positions one step before.
+        state: by velocities, or by the positions a step before.
         continues: whether it goes on from its own last answer, whatever a request says; the first
             request of a case is then the only one with a state of ours.
     """
@@ -114,16 +113,16 @@ class Fixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Greeting(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a solver says of itself before it is asked anything.
+    """The first message of a solver, before any request.
 
     Attributes:
         protocol: the version that it speaks.
-        tasks: those that it offers.
+        tasks: the offered tasks.
         name, version, language: as they are to be shown.
         precision: of its numbers.
         chains_only: whether it takes no skeletons with branches.
         max_joints: the most joints that it takes.
-        effector: whether any joint may be the effector, or only the last one.
+        effector: whether any joint may be the effector, or only the last joint.
         rotations: whether poses have rotations; else all are the identity, as for a solver that
             moves points.
         planar: whether everything lies in the plane z = 0.

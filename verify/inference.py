@@ -1,6 +1,6 @@
-"""Infer what a solver takes from its answers: many take less than a request may hold.
+"""Infer the restrictions of a solver from its answers.
 
-A solver whose answers are wrong may be right on chains, with one mass for all particles or in a
+A solver with wrong answers may be right on chains, with a single mass for all particles or in a
 plane. It is asked whether its answers change with an input, or come at all. If they do not, it is
 judged by requests that do not need the input, and the report says so.
 """
@@ -180,7 +180,7 @@ def _fields(evidence: Evidence) -> dict[str, Any]:
 
 
 def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence) -> TaskReport:
-    """Return the report on a restricted solver with what it assumes, and the faults elsewhere."""
+    """Return the report on a restricted solver with its assumptions, and the faults elsewhere."""
     notes = [
         sentence("{about}: {why}.", about=restriction.about, why=why)
         for restriction, why in evidence
@@ -236,7 +236,7 @@ def _inputs_of(report: TaskReport) -> set[str]:
 
 
 def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
-    """Return whether answered vectors have z = 0, one z or z as it was; rotations are about z."""
+    """Return whether answered vectors have one z or an unchanged z; rotations are about z."""
     before = case.inputs["positions" if "positions" in case.inputs else "offsets"][:, 2]
     vectors = [np.asarray(x)[..., 2] for x in outputs.values() if np.shape(x)[-1:] == (3,)]
     rotations = [np.asarray(x) for x in outputs.values() if np.shape(x)[-1:] == (4,)]

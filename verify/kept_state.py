@@ -1,4 +1,4 @@
-"""Ask wrong answers again in a new process and in reverse: what is kept between requests shows."""
+"""Ask wrong answers again in a new process and in reverse: state kept between requests shows."""
 
 import tomllib
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ STEPS = ("mass_spring_step", "mass_spring_motion")
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
     """Return the report with the fault that answers depend on earlier requests, if they do.
 
-    Other mistakes that explain such answers do so by chance, except of steps, where what is kept is
-    a matrix or a state.
+    Other mistakes that explain such answers do so by chance, except of steps, where a matrix or a
+    state is kept.
     """
     contestant = examination.contestant
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
@@ -51,7 +51,7 @@ def _is_steady(judgement: CaseJudgement) -> bool:
 
 
 def _changed_share(contestant: Contestant, judgements: Sequence[CaseJudgement]) -> float:
-    """Return the share of answers that differ when they are asked again, the last one first."""
+    """Return the share of answers that differ when asked again, the last answer first."""
     contestant.close()
     changed = 0
     for judgement in reversed(judgements):

@@ -36,11 +36,11 @@ def finding(
     law: str | None = None,
     **values: object,
 ) -> Finding:
-    """Return RIGHT if an error is within its tolerance, else what an entry of `laws.toml` says.
+    """Return RIGHT if an error is within its tolerance, else the finding of `laws.toml`.
 
     The key is a law, or a law and a reason after a comma; the sentence has the fields {error},
-    {index} of the worst joint, particle or point, and `values`. `verdict` and `law` replace those
-    of the entry.
+    {index} of the worst joint, particle or point, and `values`. `verdict` and `law` replace the
+    fields of the entry.
     """
     entry, error = LAWS[key], float(error)
     if verdict is None:
@@ -57,7 +57,7 @@ def finding(
 def of_joints(
     key: str, errors: FloatArray, tolerance: float, verdict: Verdict | None = None
 ) -> Finding:
-    """Return the finding about the worst joint, at the first wrong one: there the fault begins."""
+    """Return the finding about the worst joint, at the first: there the fault begins."""
     worst, wrong = int(np.argmax(errors)), errors > tolerance
     index = int(np.argmax(wrong)) if wrong.any() else worst
     return finding(key, errors[worst], tolerance, verdict=verdict, index=index, joint=worst)
@@ -130,7 +130,7 @@ def hints_of(
 
 
 def proportion_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    """Return which outputs are zero in all answers, or the right ones times one number."""
+    """Return which outputs are zero in all answers, or the right outputs times a number."""
     answers = [
         (judgement.answer.values, judgement.expected)
         for judgement in judgements
@@ -155,7 +155,7 @@ Pairs = Sequence[tuple[FloatArray, FloatArray]]
 
 
 def _relations(name: str, pairs: Pairs) -> Iterable[Sentence]:
-    """Yield how an output's answers, first in each pair, come from the right ones."""
+    """Yield relations of an output's answers, first in each pair, to the right answers."""
     if _has_one_row(pairs):
         yield sentence(
             "In each answer all {name} but the first are the same: do they share one array?",
@@ -207,7 +207,7 @@ def _axes(pairs: Pairs) -> str:
 
 
 def _decimals(pairs: Pairs) -> int | None:
-    """Return the number of decimals of the first arrays if they are the second ones rounded."""
+    """Return the number of decimals of the first arrays if they are the second arrays rounded."""
     a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
     for decimals in range(MAX_DECIMALS):
         is_round = np.abs(a - np.round(a, decimals)).max() <= 1e-3 * 0.1**decimals

@@ -79,7 +79,7 @@ def _greeting_of(numbers: np.ndarray, greeting: Greeting) -> tuple[Greeting, Sen
 
 
 def _digits(numbers: np.ndarray) -> int:
-    """Return the significant digits of rounded numbers, or their decimal places if those fit."""
+    """Return the significant digits of rounded numbers, or their decimal places if these fit."""
     decimals = _decimals(numbers)
     digits = [len(decimal.digits) for decimal in decimals]
     places = [-int(decimal.exponent) for decimal in decimals]
@@ -95,8 +95,8 @@ def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
     """Return the report on wrong answers as rounded ones, or judged in single precision.
 
-    They are so judged if that makes them right, or those of them that it makes right have errors
-    of single precision: the others are wrong in it too.
+    They are so judged if that makes them right, or if the answers made right have errors
+    of single precision: the other answers are wrong in single precision too.
     """
     greeting = report.greeting
     if report.verdict is not Verdict.WRONG or greeting is None:
@@ -146,7 +146,7 @@ def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
 
 
 def _long_numbers(arrays: Iterable[Any]) -> np.ndarray:
-    """Return those finite numbers that need more than 12 bits: not 0, 1 or a half."""
+    """Return the finite numbers that need more than 12 bits: not 0, 1 or a half."""
     numbers = np.concatenate([np.ravel(array) for array in arrays if not isinstance(array, str)])
     numbers = numbers[np.isfinite(numbers)].astype(float)
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
@@ -170,7 +170,7 @@ def has_double(report: TaskReport) -> bool:
 
 
 def are_off_by_single(judgements: Sequence[CaseJudgement]) -> bool:
-    """Return whether the errors of most answers are those of single precision."""
+    """Return whether the errors of most answers are errors of single precision."""
     counts = (judgement.digits for judgement in judgements)
     digits = [count for count in counts if count is not None] or [0.0]
     return min(digits) >= CORRECT[0] and float(np.median(digits)) <= CORRECT[1]

@@ -134,7 +134,7 @@ class Attempt:
         return exchanges
 
     def judge(self, greeting: Greeting, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
-        """Judge answers by a greeting: those given, or else to the cases that suit it."""
+        """Judge the given answers by a greeting, or else answers to all suitable cases."""
         exchanges = self._ask(greeting) if exchanges is None else exchanges
         self._notify(sentence("judging {task}", task=self.task), 0, None)
         greeting, reason = precision.judging_greeting(exchanges, greeting)
@@ -151,7 +151,7 @@ class Attempt:
         return report
 
     def observe(self, verdict: TaskReport, search: CauseSearch) -> tuple[Sentence, ...]:
-        """Return what wrong answers show, or why that is not known, and () of right answers."""
+        """Return observations on wrong answers, or the reason for none; () for right answers."""
 
         def observe_in_time() -> tuple[Sentence, ...]:
             with search.limited():
@@ -167,7 +167,7 @@ class Attempt:
     ) -> TaskReport:
         """Return the report on a verdict with the cause of wrong answers, if one is found in time.
 
-        `reports` are those on earlier tasks. The verdict stays.
+        `reports` are the reports on earlier tasks. The verdict stays.
         """
         if verdict.verdict is Verdict.RIGHT and self.task != inverse_kinematics.TASK:
             return verdict
@@ -225,15 +225,15 @@ class Attempt:
 
 
 def _with_hint(report: TaskReport, hint: Sentence) -> TaskReport:
-    """Return a report with one more hint, the first."""
+    """Return a report with a hint before the others."""
     diagnosis = report.diagnosis
     return replace(report, diagnosis=replace(diagnosis, hints=(hint, *diagnosis.hints)))
 
 
 def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnosis]) -> TaskReport:
-    """Return a report with its diagnosis; what examiners have found comes first.
+    """Return a report with its diagnosis, after the explanations of examiners.
 
-    A solver that is judged by what it takes may have a mistake in what it does not take.
+    A solver that is judged by restricted requests may have a mistake in the other requests.
     """
     before = report.diagnosis
     if before.is_certain:
@@ -265,7 +265,7 @@ def _unless_meant(explanation: Explanation) -> Explanation:
 
 
 def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> TaskReport:
-    """Return a report with what its wrong answers show."""
+    """Return a report with its observations."""
     if not observed:
         return report
     return replace(report, diagnosis=replace(report.diagnosis, observations=observed))
@@ -274,10 +274,10 @@ def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> Ta
 def _known_faults(
     task: str, reports: Sequence[TaskReport], causes: Sequence[TaskReport]
 ) -> Sequence[SwitchFault | str] | None:
-    """Return the faults of what a task builds upon, None if that is right or not explained.
+    """Return the faults of a task's foundations, None if right or unexplained.
 
-    Of robots they are keys, none if their Jacobian is wrong for an unknown reason. Poses that miss
-    for a known reason do so in motions too.
+    For robots the faults are keys, none if the Jacobian is wrong for an unknown reason. Poses that
+    miss for a known reason miss in motions too.
     """
     if not task.startswith("robot"):
         return next(filter(None, map(faults.explaining, causes)), None)
@@ -392,8 +392,7 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
 def _ask(contestant: Contestant, cases: Sequence[Case], notify: Notify) -> list[Exchange]:
     """Ask each case, then each answered case a second time.
 
-    Forces and energies are asked again in reverse, so that what is left over from the request
-    before shows.
+    Forces and energies are asked again in reverse, so that remains of the last request show.
     """
     answers, hangs, work = [], 0, sentence("asking {task}", task=cases[0].task if cases else "")
     for i, case in enumerate(cases):

@@ -37,8 +37,8 @@ def variants(
 ) -> Iterator[Variant]:
     """Yield the textbook's method with all combinations of its faults, the fewest first.
 
-    Before them come those with the faults in `base`, which its forward kinematics is known to have.
-    A fault beside which a program's other choices show comes with each of them.
+    Combinations with the faults in `base`, the known faults of forward kinematics, come first.
+    A fault beside which other choices of a program show comes with each choice.
     """
     task, _, solver = method.rpartition(" ")
     predict: Callable[[Switches, Case], Mapping[str, Any]] = predict_forward
@@ -68,7 +68,7 @@ def programs(
 ) -> list[dict[str, int]]:
     """Return the choices of right programs that show beside some faults, as switches.
 
-    They show beside a single fault, or a single one besides those of the `base`.
+    The choices show beside a single fault, or a single fault besides the `base`.
     """
     parts, names = {fault.part for fault in faults}, {fault.switch for fault in faults}
     base_keys = {fault.key for fault in base}
@@ -161,9 +161,9 @@ def diagnosis_of(
 
 
 def _adds(explanation: Explanation, base: Sequence[SwitchFault]) -> bool:
-    """Return whether an explanation adds faults to those of what the task builds upon.
+    """Return whether an explanation adds faults to the base.
 
-    What these alone do to a program of another structure is more likely than one more fault.
+    The base alone, in a program of another structure, is more likely than an additional fault.
     """
     keys = {fault.key for fault in base}
     return bool(keys) and not keys.issuperset(explanation.faults[0].split(" + "))

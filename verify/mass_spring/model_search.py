@@ -56,7 +56,7 @@ class ModelMatch(NamedTuple):
 
     @property
     def complexity(self) -> tuple[int, int]:
-        """The number of faults, and of those that concern a part of the step alone."""
+        """The number of faults, and of faults in a part of the step alone."""
         return len(self.faults), sum(bool(fault.part) for fault in self.faults)
 
 
@@ -157,7 +157,7 @@ class ModelSearch:
     def run(self, cases: Sequence[Probe] = ()) -> list[ModelMatch]:
         """Return the matches of the probes with the fewest faults, none if there are none.
 
-        Small probes do not tell where many iterations begin: of several honest steps the one that
+        Small probes do not tell where many iterations begin: of several honest steps the step that
         explains all `cases` is taken.
         """
         hypotheses = [Choices()]
@@ -218,7 +218,7 @@ class ModelSearch:
         return min(gaps, default=1.0) < DOUBLE
 
     def _reproducing(self, hypotheses: Sequence[Choices], index: int) -> list[Choices]:
-        """Return the explaining hypotheses that do not merely predict nothing."""
+        """Return the explaining hypotheses that predict a number."""
         return [choices for choices in hypotheses if self._gap(choices, index) is not None]
 
     def _is_complete(self, index: int) -> bool:
@@ -263,7 +263,7 @@ class ModelSearch:
         return sum(self.costs[id(option)] for option in choices.values())
 
     def _is_rare(self, choices: Choices) -> bool:
-        """Return whether choices are among those that are not tried together with faults."""
+        """Return whether choices are never tried together with faults."""
         return any(
             option.rare and option.aspect not in self.declared_aspects
             for option in choices.values()
@@ -271,7 +271,7 @@ class ModelSearch:
         )
 
     def _fits(self, choices: Choices, index: int) -> bool:
-        """Return whether choices explain the stages up to one, except those that nothing does."""
+        """Return whether choices explain the stages up to an index, but for inexplicable stages."""
         return (
             self._cost(choices) <= MAX_FAULTS
             and compatible(choices)
@@ -380,7 +380,7 @@ def _acts_in_flight(option: Option) -> bool:
 def in_flight(integrator: Integrator, usual: Integrator = ONE_STEP) -> Integrator:
     """Return an integrator that moves free particles alike: without springs g is quadratic.
 
-    One that solves for the minimum stands for all others that do: the usual one.
+    The usual integrator that solves for the minimum stands for all of its kind.
     """
     if integrator.method == "in_place":
         return integrator._replace(method="symplectic")

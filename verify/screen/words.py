@@ -1,4 +1,4 @@
-"""What the terminal, the files and the page of `verify` share: verdicts in words."""
+"""Verdicts in words, for the terminal, the files and the page of `verify`."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -41,7 +41,7 @@ class Presentation(NamedTuple):
 
 
 def speaker(language: str) -> Say:
-    """Return a function that translates a sentence to one line of printable text."""
+    """Return a function that translates a sentence to a line of printable text."""
     translate = translator(language)
     return lambda words: visible(words.text(translate))
 
@@ -105,7 +105,7 @@ def introduction(report: Report) -> Sentence:
 
 
 def remarks(report: Report) -> Iterator[Sentence]:
-    """Yield what is assumed, with its tasks if not all, and reasons for the lack of a time."""
+    """Yield the assumptions, with their tasks if not all, and reasons for missing times."""
     reasons = {str(reason): reason for task in report.tasks for reason in task.assumptions}
     for text, reason in reasons.items():
         tasks = [title(task) for task in report.tasks if text in map(str, task.assumptions)]
@@ -122,7 +122,7 @@ def remarks(report: Report) -> Iterator[Sentence]:
 
 
 def is_unwritten(task: TaskReport) -> bool:
-    """Return whether all answers to a task are those of a starter that nobody has filled in."""
+    """Return whether all answers to a task come from a starter as written."""
     return bool(task.judgements) and all(
         isinstance(judgement.answer, Failure) and UNWRITTEN in str(judgement.answer.sentence)
         for judgement in task.judgements
@@ -130,7 +130,7 @@ def is_unwritten(task: TaskReport) -> bool:
 
 
 def explanations(report: TaskReport) -> Iterator[Sentence]:
-    """Yield what wrong answers show, then their causes."""
+    """Yield the observations on wrong answers, then the causes."""
     yield from report.diagnosis.observations
     yield from causes(report)
 
@@ -176,7 +176,7 @@ def _error_in(words: Sentence) -> float:
 
 
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
-    """Return what to do next."""
+    """Return the next step to take."""
     bad = [task for task in tasks if task.verdict not in GOOD]
     if not bad and any(task.verdict is Verdict.RIGHT_EXCEPT for task in tasks):
         return sentence(
