@@ -80,7 +80,7 @@ def ancestors(parents, effector):
 def ccd(parents, offsets, local_rotations, target, effector, tolerance, max_iterations, **options):
     kind = {"dead": 0.0, **options}
     up, tip = kind.pop("up", True), kind.pop("rotates_tip", False)
-    normalises = kind.pop("normalises", True)
+    normalises, tests_each = kind.pop("normalises", True), kind.pop("tests_each", False)
     Q, path = local_rotations.copy(), ancestors(parents, effector)
     joints = path if tip else path[:-1]
     for _ in range(max_iterations):
@@ -89,6 +89,8 @@ def ccd(parents, offsets, local_rotations, target, effector, tolerance, max_iter
             break
         for j in reversed(joints) if up else joints:
             x, R = forward_kinematics(parents, offsets, Q)
+            if tests_each and np.linalg.norm(x[effector] - target) <= tolerance:
+                break
             if j == effector:
                 Q[j] = product(Q[j], np.array([0.6, 0.8, 0, 0], dtype=Q.dtype))
                 continue

@@ -28,6 +28,7 @@ HONEST = {
     "not normalised": ("ccd", students.ccd, {"normalises": False}),
     "small angles dropped": ("ccd", students.ccd, {"dead": 1e-6}),
     "root to tip": ("ccd", students.ccd, {"up": False}),
+    "tests after each joint": ("ccd", students.ccd, {"tests_each": True}),
     "effector rotated": ("ccd", students.ccd, {"rotates_tip": True}),
     "capped": ("ccd", students.ccd, {"kind": students.axis_angle, "most": 0.3}),
     "damped": ("ccd", students.ccd, {"kind": students.axis_angle, "share": 0.7}),

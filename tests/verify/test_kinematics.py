@@ -28,6 +28,7 @@ from kinematics_solvers import (
 from plumbob.reference import IK_SOLVERS, resample, rotation
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
+from plumbob.verify.kinematics import sweeps
 from plumbob.verify.kinematics.faults import FAULTS, by_key
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import forward, solve
@@ -139,6 +140,16 @@ def test_honest_variant_is_not_accused(name):
     report = judged(INVERSE, students.with_options(function, **options), method)
     assert report.verdict is RIGHT_EXCEPT  # it is stuck at least on collinear targets
     assert all(e.faults == ("root to tip",) for e in report.diagnosis.explanations)
+
+
+def test_a_sweep_that_ends_within_its_tolerance_names_no_mistake(monkeypatch):
+    early = students.with_options(students.ccd, tests_each=True)
+    report = judged(INVERSE, early, "ccd")
+    assert any("ends a sweep as soon as" in words for words in told(report))
+    monkeypatch.setattr(sweeps, "honest_variant", lambda *arguments: None)
+    report = judged(INVERSE, early, "ccd")
+    assert report.verdict is RIGHT_EXCEPT
+    assert not report.diagnosis.explanations
 
 
 @pytest.mark.slow

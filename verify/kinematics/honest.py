@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from plumbob.text.sentence import Sentence, with_code
+from plumbob.text.sentence import Sentence, sentence, with_code
 
 from .switches import Switches
 
@@ -34,3 +34,9 @@ HONEST: Mapping[str, tuple[HonestSweeps, ...]] = {
     "fabrik": (*_honest("fabrik"), *STOPS[:-1]),  # the last stop is CCD's own
 }
 ROOT_FIRST = next(choice.switches for choice in HONEST["ccd"] if choice.key == "root to tip")
+# A sweep that may end in its middle: each iteration rotates one joint of a sweep.
+AFTER_EACH_JOINT = HonestSweeps(
+    "tests after each joint",
+    Switches(budget=3),
+    sentence("It is CCD that ends a sweep as soon as the effector is within the tolerance."),
+)

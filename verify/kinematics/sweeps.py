@@ -21,7 +21,7 @@ from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import LAWS, finding
 from . import pose_laws, rounding
 from .algebra import DEGREE
-from .honest import HONEST, ROOT_FIRST
+from .honest import AFTER_EACH_JOINT, HONEST, ROOT_FIRST
 from .predictions import predict_inverse, solve
 from .switches import Switches
 
@@ -53,6 +53,12 @@ class PoseTrial:
         findings = self.judgement.findings
         is_law = any(f.verdict >= Verdict.WRONG and f.law != "claims" for f in findings)
         return is_law or self.judgement.verdict is Verdict.BROKEN
+
+    @property
+    def has_ended(self) -> bool:
+        """Whether the pose is within its tolerance, where an honest sweep may end early."""
+        tolerance = self.case.inputs["tolerance"]
+        return bool(tolerance > 0.0 and self.pose.distance <= tolerance)
 
     @property
     def comparable(self) -> Exchange:
@@ -214,7 +220,19 @@ def honest_variant(trials: Sequence[PoseTrial], method: str, greeting: Greeting)
     for choice in HONEST[method]:
         if _explains(trials, method, greeting, choice.switches):
             return choice.sentence
+    is_early = method == "ccd" and any(trial.has_ended for trial in trials)
+    if is_early and all(_ends_after_a_joint(trial, greeting) for trial in trials):
+        return AFTER_EACH_JOINT.sentence
     return None
+
+
+def _ends_after_a_joint(trial: PoseTrial, greeting: Greeting) -> bool:
+    """Return whether a pose is that of sweeps which test the distance after each joint."""
+    inputs, links = trial.case.inputs, len(trial.case.facts["path"]) - 1
+    rotations = links * inputs["max_iterations"]
+    case = replace(trial.case, inputs={**inputs, "max_iterations": rotations})
+    prediction = predict_inverse("ccd", AFTER_EACH_JOINT.switches, case)
+    return difference(prediction, trial.pose.outputs) <= prediction_bound(greeting, trial.case)
 
 
 def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | None:

@@ -23,7 +23,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.limits import READINGS
-from ..kinematics.sweeps import ROUNDED
+from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS
 from ..precision import judging_greeting
 from .mutants import Mutant, Program
@@ -34,8 +34,8 @@ from .right_programs import FAULTS, KINDS, answer_of, comparable, faults_in, pro
 SMALL, LARGE, TRIAL = 9, 3, 1
 # Of quarter turns rounding decides which of equal components a quaternion is made of.
 TRIAL_OF_QUARTERS = 6
-# So many answers a right program has to miss before its lines are changed: fewer would be met by
-# many changes by chance.
+# So many answers a right program has to miss before its lines are changed, or, if they keep all
+# laws, before any mistake is named: fewer would be met by many changes by chance.
 MIN_DIFFERENT = 3
 # The share of the answers that a program has to give.
 MIN_SHARE = 0.75
@@ -106,7 +106,12 @@ def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
     These are sweeps that differ from the textbook's, or else all sweeps within limits.
     """
     sweeps = [j for j in report.judgements if j.case.requirement == "must" and _is_single(j)]
-    differing = [j for j in sweeps if any(map(_is_of_another, j.findings))]
+    differing = [
+        j
+        for j in sweeps
+        if any(map(_is_of_another, j.findings))
+        and not PoseTrial(Exchange(j.case, j.answer, j.answer)).has_ended
+    ]
     if differing:
         return differing, False
     limited = [j for j in report.judgements if "cones" in j.case.inputs]
@@ -191,7 +196,8 @@ def _of_program(
     """
     run = partial(answer_of, program, report.method)
     different, same, passes = _compare(program, run, compared, tolerance)
-    if not different:
+    least = MIN_DIFFERENT if report.verdict <= Verdict.RIGHT_EXCEPT else 1
+    if len(different) < least:
         return ()
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
