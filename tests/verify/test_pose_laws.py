@@ -4,6 +4,7 @@ The lies of `test_kinematics_inverse.py` are gross; a tolerance that is wrong by
 only here.
 """
 
+import conformance_students as students
 import numpy as np
 import pytest
 
@@ -13,7 +14,7 @@ from plumbob.verify import laws
 from plumbob.verify.case import Case
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import inverse_kinematics, pose_laws
+from plumbob.verify.kinematics import inverse_kinematics, pose_laws, rounding
 
 EPSILON = {"double": 2.0**-52, "single": 2.0**-23}
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
@@ -107,6 +108,8 @@ def test_law_is_kept_to_rounding(case, name, precision):
     bound = 5 * 16.0 * EPSILON[precision]
     if law in ("link lengths", "branches"):  # of five joints in ten iterations, up to a limit
         bound = min(5 * 10 * bound, pose_laws.AGREEMENT)
+    if law == "unit quaternions":  # of five joints in ten iterations
+        bound = min(5 * 10 * bound, rounding.LARGEST_DRIFT)
     if law == "joints off the path":  # quotients of rotations by ten iterations
         bound = min(10 * bound, pose_laws.AGREEMENT)
     for share, expected in ((0.5, RIGHT), (2.0, verdict)):
@@ -114,6 +117,25 @@ def test_law_is_kept_to_rounding(case, name, precision):
         assert (found[law].verdict, found[law].index) == (expected, joint)
         others = {"root in place", "link lengths", "branches", "unit quaternions"} - {law}
         assert {found[other].verdict for other in others} == {RIGHT}
+
+
+@pytest.mark.parametrize(("stretch", "verdict"), [(0.0, RIGHT), (1e-6, RIGHT_EXCEPT)])
+def test_rounding_of_a_hundred_sweeps_is_no_missing_normalisation(rng, stretch, verdict):
+    inputs = {
+        "parents": np.array([-1, 0, 1]),
+        "offsets": rng.uniform(-1.0, 1.0, (3, 3)),
+        "local_rotations": rotation.random(rng, 3),
+        "target": np.array([3.0, 4.0, 0.0]),  # beyond reach
+        "effector": 2,
+        "tolerance": 0.0,
+        "max_iterations": 100,
+    }
+    local, _ = students.ccd(**inputs, normalises=False)
+    facts = {"path": np.arange(3), "size": SIZE, "reach": REACH, "least": 0.0, "before": 1.0}
+    case = Case("", "inverse_kinematics", inputs, "", sentence(""), facts=facts)
+    pose = pose_laws.read_pose({"local_rotations": (1.0 + stretch) * local}, inputs, facts)
+    (unit, *_) = pose_laws.rotation_laws(pose, case, Greeting(1, (case.task,)))
+    assert (unit.law, unit.verdict) == ("unit quaternions", verdict)
 
 
 def test_every_pair_of_children_keeps_its_distance(rng):

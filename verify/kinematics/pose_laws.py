@@ -159,7 +159,8 @@ def rotation_laws(pose: AnsweredPose, case: Case, greeting: Greeting) -> list[Fi
         return findings
     lengths = np.where(usable, lengths, 1.0)
     if usable.any():
-        findings.append(unit_quaternions(lengths, bound))
+        drift = rounding.lengths(greeting.epsilon, len(pose.raw), _repetitions(case))
+        findings.append(unit_quaternions(lengths, drift))
     start = case.inputs["local_rotations"]
     rotations = np.where(usable[:, None], pose.raw / lengths[:, None], start)
     angles = rotation.angle(rotations, start / np.linalg.norm(start, axis=-1, keepdims=True))

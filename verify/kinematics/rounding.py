@@ -30,6 +30,16 @@ def rotations(epsilon: float, joints: int) -> float:
     return ROUNDINGS_A_JOINT * joints * epsilon
 
 
+def lengths(epsilon: float, joints: int, sweeps: int) -> float:
+    """Return how far rounding takes quaternions from unit length if none is made unit.
+
+    A sweep multiplies the rotation of each joint by a product of up to `joints` quaternions. The
+    roundings of one sweep add up to those of all, at worst with one sign. Reversed products with
+    global rotations enlarge an error in every sweep: such a drift is no rounding any more.
+    """
+    return min(joints * sweeps * rotations(epsilon, joints), LARGEST_DRIFT)
+
+
 def repeats(epsilon: float, size: float) -> float:
     """Return how far two answers to a request may differ: threads may add up in another order."""
     return ROUNDINGS_A_JOINT * epsilon * max(size, 1.0)
