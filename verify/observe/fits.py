@@ -1,6 +1,6 @@
 """The fewest terms whose sum, with one coefficient each, is a quantity in all cases."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
 from itertools import combinations
 from typing import NamedTuple
@@ -17,9 +17,6 @@ MIN_SHARE = 1e-3
 NUMBERS_FOR_EACH = 4
 # Columns whose singular values differ by more are dependent.
 INDEPENDENT = 1e-7
-# What is added to the squares of columns, so that dependent ones can be solved for; the share of a
-# square sum that near sums leave at the most, far above that and above TOLERANCE squared.
-RIDGE, NEARLY = 1e-12, 1e-6
 # A coefficient is a fraction of numbers up to this if the two differ by less than NEAR.
 DENOMINATOR, NEAR = 12, 1e-6
 # Coefficients this near to the right ones are right: single precision leaves 0.99998.
@@ -38,60 +35,36 @@ def fit(quantity: FloatArray, terms: Mapping[str, FloatArray], max_terms: int) -
 
     None if no sum of so few terms is the quantity.
     """
-    scale = float(np.abs(quantity).max(initial=0.0))
-    if scale == 0.0:
+    if not quantity.any():
         return []
     columns = {name: column for name, column in terms.items() if np.abs(column).max() > 0.0}
-    for count in range(1, max_terms + 1):
+    for count in range(1, min(max_terms, len(columns)) + 1):
         if len(quantity) < NUMBERS_FOR_EACH * count + 2:
             break
-        sums = [
-            terms_of(names, coefficients)
-            for names in _near_sums(quantity, columns, count)
-            if (coefficients := _coefficients(quantity, [columns[n] for n in names], scale))
-        ]
+        sums = list(_sums(quantity, columns, count))
         if sums:
             return min(sums, key=_plainness)
     return None
 
 
-def _near_sums(
+def _sums(
     quantity: FloatArray, columns: Mapping[str, FloatArray], count: int
-) -> list[tuple[str, ...]]:
-    """Return the sets of so many columns whose best sum leaves next to nothing of a quantity.
-
-    All sets are solved at once by their normal equations, which are good enough to choose by.
-    """
-    sets = np.array(list(combinations(range(len(columns)), count)))
-    if not len(sets):
-        return []
-    A = np.stack([column / np.abs(column).max() for column in columns.values()], axis=1)
-    y = quantity / np.abs(quantity).max()
-    gram, right = A.T @ A, A.T @ y
-    matrices = gram[sets[:, :, None], sets[:, None, :]] + RIDGE * len(y) * np.eye(count)
-    solutions = np.linalg.solve(matrices, right[sets][:, :, None])[:, :, 0]
-    residuals = y @ y - (right[sets] * solutions).sum(axis=1)
-    names = list(columns)
-    return [tuple(names[i] for i in sets[k]) for k in np.flatnonzero(residuals <= NEARLY * (y @ y))]
-
-
-def _coefficients(
-    quantity: FloatArray, columns: Sequence[FloatArray], scale: float
-) -> list[float] | None:
-    A = np.stack(columns, axis=1)
-    sizes = np.abs(A).max(axis=0)
-    solution, _, rank, _ = np.linalg.lstsq(A / sizes, quantity, INDEPENDENT)
-    coefficients = solution / sizes
-    if rank < len(columns) or np.abs(A @ coefficients - quantity).max() > TOLERANCE * scale:
-        return None
-    is_needed = (np.abs(solution) > MIN_SHARE * scale).all()
-    return coefficients.tolist() if is_needed else None
-
-
-def terms_of(symbols: Sequence[str], coefficients: Sequence[float]) -> list[Term]:
-    """Return terms with simple fractions where coefficients are nearly so."""
-    pairs = zip(map(_simple, coefficients), symbols, strict=True)
-    return [Term(coefficient, symbol) for coefficient, symbol in pairs]
+) -> Iterator[list[Term]]:
+    """Yield the sums that are a quantity, of so many columns, all needed and independent."""
+    scale = np.abs(quantity).max()
+    y = quantity / scale
+    names, sizes = list(columns), np.array([np.abs(column).max() for column in columns.values()])
+    rows = np.stack(list(columns.values())) / sizes[:, None]
+    sets = np.array(list(combinations(range(len(names)), count)))
+    A = np.swapaxes(rows[sets], 1, 2)  # (set, number, term)
+    solutions = np.linalg.pinv(A, INDEPENDENT) @ y
+    gaps = np.abs((A @ solutions[:, :, None])[:, :, 0] - y).max(axis=1)
+    is_needed = (np.abs(solutions) > MIN_SHARE).all(axis=1)
+    for i in np.flatnonzero(is_needed & (gaps <= TOLERANCE)):
+        if np.linalg.matrix_rank(A[i], rtol=INDEPENDENT) == count:
+            coefficients = scale * solutions[i] / sizes[sets[i]]
+            pairs = zip(coefficients.tolist(), sets[i], strict=True)
+            yield [Term(_simple(number), names[column]) for number, column in pairs]
 
 
 def _simple(number: float) -> float:

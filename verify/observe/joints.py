@@ -341,7 +341,7 @@ def _add_turns(
     need, turned = angles(turns, IDENTITY), angles(after, G[joints])
     places: dict[str, Any] = {key: column[joints] for key, column in features.items()}
     is_plain = np.abs(before[:, 1:]).max(axis=1) < UNROTATED
-    places |= {"unrotated_parent": is_plain, "angle": need}
+    places |= {"unrotated_parent": is_plain, "obtuse": need > np.pi / 2.0}
     evidence.tables["turn"].add(pose.name, angles(local[joints], due), places)
     miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
     for key, gaps, right_gaps in (

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.reference.arguments import BoolArray, FloatArray
+from plumbob.reference.arguments import BoolArray
 from plumbob.text.sentence import Sentence, sentence
 
 # Relative errors up to this are right: above rounding in single precision, which is about 1e-6
@@ -48,11 +48,11 @@ class JudgedElement(NamedTuple):
 
     case: str
     is_wrong: bool
-    features: Mapping[str, bool | float]
+    features: Mapping[str, bool]
 
 
 class Predicate(NamedTuple):
-    """A feature, its negation, or a bound of a number, and the elements that have the feature."""
+    """A feature or its negation, and the elements that have the feature or lack it."""
 
     words: Sentence
     is_negation: bool
@@ -129,11 +129,11 @@ def separation(table: ElementTable) -> Statement | None:
     wrong = np.array([element.is_wrong for element in elements], dtype=bool)
     if not elements or wrong.all():
         return None
-    if _support(elements, wrong, table.is_of_cases) < MIN_CASES:
+    groups = _labels(elements, table.is_of_cases)
+    if _support(groups, table.is_of_cases) < MIN_CASES:
         return None
-    predicates = list(_predicates(elements, wrong))
-    chance = _log_chance(elements, table.is_of_cases)
-    chance += log10(max(len(predicates), 1))
+    predicates = list(_predicates(elements))
+    chance = _log_chance(groups) + log10(max(len(predicates), 1))
     exact = [predicate for predicate in predicates if (predicate.mask == wrong).all()]
     if exact and chance <= MAX_CHANCE:
         return Statement(chance, _exact_words(table.quantity, exact, wrong), is_exact=True)
@@ -144,60 +144,34 @@ def separation(table: ElementTable) -> Statement | None:
     return None if best is None else Statement(chance / 4.0, best[1], is_exact=False)
 
 
-def _support(elements: Sequence[JudgedElement], wrong: BoolArray, is_of_cases: bool) -> int:
-    """Return the number of cases in which both classes stand, or of the rarer class of cases."""
-    if is_of_cases:
-        return int(min(wrong.sum(), (~wrong).sum()))
-    return sum(0 < sum(labels) < len(labels) for labels in _labels(elements).values())
-
-
-def _labels(elements: Sequence[JudgedElement]) -> dict[str, list[bool]]:
+def _labels(elements: Sequence[JudgedElement], is_of_cases: bool) -> list[list[bool]]:
+    """Return which elements are wrong, by case, or as one list if each is a case."""
     labels: dict[str, list[bool]] = {}
     for element in elements:
-        labels.setdefault(element.case, []).append(element.is_wrong)
-    return labels
+        labels.setdefault("" if is_of_cases else element.case, []).append(element.is_wrong)
+    return list(labels.values())
 
 
-def _log_chance(elements: Sequence[JudgedElement], is_of_cases: bool) -> float:
-    """Return log10 of the chance that a feature separates labels shuffled within each case."""
-    groups = [[e.is_wrong for e in elements]] if is_of_cases else [*_labels(elements).values()]
-    return -sum(log10(comb(len(group), sum(group))) for group in groups)
+def _support(groups: Sequence[Sequence[bool]], is_of_cases: bool) -> int:
+    """Return the number of cases in which both classes stand, or of the rarer class of cases."""
+    if is_of_cases:
+        return min(sum(groups[0]), len(groups[0]) - sum(groups[0]))
+    return sum(0 < sum(labels) < len(labels) for labels in groups)
 
 
-def _predicates(elements: Sequence[JudgedElement], wrong: BoolArray) -> Iterator[Predicate]:
-    """Yield each feature that some elements have and some lack, and its negation; then bounds."""
+def _log_chance(groups: Sequence[Sequence[bool]]) -> float:
+    """Return log10 of the chance that a feature separates labels shuffled within each group."""
+    return -sum(log10(comb(len(labels), sum(labels))) for labels in groups)
+
+
+def _predicates(elements: Sequence[JudgedElement]) -> Iterator[Predicate]:
+    """Yield each feature that some elements have and some lack, and its negation."""
     shared = [n for n in elements[0].features if all(n in e.features for e in elements)]
     for name in shared:
-        column = np.array([element.features[name] for element in elements])
-        if column.dtype != bool:
-            yield from _bounds(name, column, wrong)
-        elif 0 < column.sum() < len(column):
-            yield Predicate(words_of("feature", name), False, column)
-            yield Predicate(words_of("feature", name), True, ~column)
-
-
-def _bounds(name: str, column: FloatArray, wrong: BoolArray) -> Iterator[Predicate]:
-    """Yield the bound that separates a number of wrong and right elements, if there is any."""
-    quantity = words_of("number", name)
-    for low, high, is_above in ((column[~wrong], column[wrong], True),
-                                (column[wrong], column[~wrong], False)):  # fmt: skip
-        # one value on a side is a feature of its own, not a bound
-        if low.max() < high.min() and len({*low}) > 1 and len({*high}) > 1:
-            bound = _round_between(float(low.max()), float(high.min()))
-            words = sentence(
-                "where {number} is above {bound:.3g}"
-                if is_above
-                else "where {number} is below {bound:.3g}",
-                number=quantity,
-                bound=bound,
-            )
-            yield Predicate(words, False, column > bound if is_above else column < bound)
-
-
-def _round_between(low: float, high: float) -> float:
-    middle = (low + high) / 2.0
-    rounded = (round(middle, digits) for digits in range(-3, 12))
-    return next((number for number in rounded if low < number < high), middle)
+        mask = np.array([element.features[name] for element in elements], dtype=bool)
+        if mask.any() and not mask.all():
+            yield Predicate(words_of("feature", name), False, mask)
+            yield Predicate(words_of("feature", name), True, ~mask)
 
 
 def _exact_words(quantity: Sentence, exact: Sequence[Predicate], wrong: BoolArray) -> Sentence:
