@@ -138,6 +138,20 @@ def test_a_fault_is_told_once_a_screen(wrong):
     assert screen.count("[PB-FK-003], as above.") == 1
 
 
+def test_a_fault_is_told_once_of_a_task(right):
+    """A finding that states the choice of an explanation adds nothing."""
+    words = with_code("PB-CCD-015", MEND)
+    choice = Finding(
+        "one sweep", Verdict.RIGHT_EXCEPT, 1.0, 0.0, "", sentence("{what}", what=words)
+    )
+    task = right.tasks[0]
+    reserved = replace(task.judgements[0], findings=(choice,))
+    diagnosis = replace(task.diagnosis, explanations=(Explanation(("mend",), words, 1.0, 0.0),))
+    task = replace(task, judgements=[reserved, *task.judgements[1:]], diagnosis=diagnosis)
+    screen = normal("\n".join(terminal.lines(replace(right, tasks=[task]), shown())))
+    assert screen.count("PB-CCD-015") == 1
+
+
 def test_positions_that_rotations_do_not_give_stand_beside_those_that_they_give():
     inputs = {
         "parents": np.array([-1, 0]), "offsets": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]),

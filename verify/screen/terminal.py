@@ -106,8 +106,10 @@ def _summary(
     """Return the name of a task and the sentences about its answers, each on a line of its own."""
     failure, texts = task.smallest_failure, set[str]() if texts is None else texts
     sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
-    words = list(dict.fromkeys(say(without_repetition(words, texts)) for words in sentences))
-    new = [text for text in words if not any(text != other and text in other for other in words)]
+    whole = {say(words): words for words in sentences}
+    parts = {text for text in whole for other in whole if text != other and text in other}
+    words = [without_repetition(words, texts) for text, words in whole.items() if text not in parts]
+    new = list(dict.fromkeys(map(say, words)))
     first, *others = [f"{title(task)}: " + "".join(new[:1]), *new[1:]]
     return [*wrapped(first, indent), *(s for text in others for s in wrapped(text, f"{indent}  "))]
 
