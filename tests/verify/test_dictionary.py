@@ -14,6 +14,7 @@ from plumbob.verify.dictionary.requests import FK, TASKS, keys, requests
 from plumbob.verify.fault_programs import IN_DICTIONARY, coded_faults, source_of
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.one_line.right_programs import answer_of
 from plumbob.verify.one_line.search import with_changed_line
@@ -111,6 +112,24 @@ def test_requests_are_sent_twice_to_a_new_process():
 def test_nothing_is_looked_up_for_answers_that_differ():
     result = proposals(Solver(source_of("forward kinematics"), noise=1e-3))
     assert (result.entries, result.hint) == ((), UNSTEADY)
+
+
+@pytest.mark.usefixtures("verdict_alone")
+@pytest.mark.parametrize("content", [None, b"", b"version", file_of(FK, "").read_bytes()[:999]])
+def test_without_a_readable_dictionary_the_search_goes_on(content, tmp_path, monkeypatch):
+    path = tmp_path / "forward_kinematics.xz"
+    if content is not None:
+        path.write_bytes(content)
+    monkeypatch.setattr(module, "file_of", lambda *_: path)
+    solver = Solver(coded_faults()[FAULT].wrong_program)
+    hint = proposals(solver).hint
+    assert str(hint).startswith("The dictionary forward_kinematics.xz cannot be read")
+    cases = DISCIPLINES[FK].cases(solver.greeting, "", 0, False)[:5]
+    report = judge_cases(solver, FK, "", cases)
+    searched = []
+    monkeypatch.setattr(search, "changed_lines", lambda *arguments: searched.append(arguments))
+    assert hint in with_changed_line(report, solver.greeting, solver).diagnosis.hints
+    assert [arguments[-1] for arguments in searched] == [None]  # without proposals
 
 
 @pytest.mark.parametrize("restriction", [{"planar": True}, {"rotations": False}, {"limits": True}])

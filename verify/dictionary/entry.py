@@ -71,8 +71,17 @@ def _planes(keys: Any) -> bytes:
 
 
 def read(path: Path) -> Dictionary:
-    """Return the dictionary in a file."""
-    line, _, data = lzma.decompress(path.read_bytes()).partition(b"\n")
+    """Return the dictionary in a file.
+
+    Raises:
+        OSError: if the file is missing or cannot be read.
+        ValueError: if it is no dictionary, as a file that was not fetched or copied whole.
+    """
+    try:
+        text = lzma.decompress(path.read_bytes())
+    except (lzma.LZMAError, EOFError) as error:
+        raise ValueError(f"{path}: expected a compressed dictionary: {error}") from error
+    line, _, data = text.partition(b"\n")
     head = json.loads(line)
     planes = np.frombuffer(data, "u1").reshape(4, -1)
     keys = np.ascontiguousarray(planes.T).view("<f4").reshape(head["shape"]).astype(float)

@@ -34,7 +34,7 @@ class Proposals(NamedTuple):
 
     entries: Sequence[Entry] = ()  # the likeliest first
     is_wrong: bool = True  # whether the solver answers a request otherwise than right programs
-    hint: Sentence | None = None  # why nothing is looked up
+    hint: Sentence | None = None  # why nothing is looked up, or that no file can be read
 
 
 def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) -> Proposals | None:
@@ -46,6 +46,12 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
     cases = [case for case in requests(task, method) if suitable(case, greeting)]
     if not methods or not cases:
         return None
+    dictionaries = dict[str, Dictionary]()
+    for own in methods:
+        try:
+            dictionaries[own] = read(file_of(task, own))
+        except (OSError, ValueError):
+            return Proposals(hint=_unreadable(file_of(task, own).name))
     contestant.close()
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
@@ -59,9 +65,18 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
         for case, answer in zip(cases, first, strict=True):
             rows[names.index(case.name)] = _keys_of(answer, case, base, own)
         is_wrong |= bool(np.nanmax(np.abs(rows), initial=0.0) > tolerance)
-        ranks += _matches(read(file_of(task, own)), rows, tolerance)
+        ranks += _matches(dictionaries[own], rows, tolerance)
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
     return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong)
+
+
+def _unreadable(file: str) -> Sentence:
+    """Return why all lines are searched where a file is missing, or is no dictionary."""
+    return sentence(
+        "The dictionary {file} cannot be read: all lines are searched instead, which takes longer "
+        "and finds less. Install Plumbob again, or run `make dictionary` in its folder.",
+        file=file,
+    )
 
 
 def _is_same(first: Answer | Failure, second: Answer | Failure) -> bool:

@@ -15,7 +15,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
 from ..dictionary.entry import Entry
-from ..dictionary.look_up import Proposals, look_up
+from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..explain import MORE, Variant, explain, together
 from ..fault_programs import IN_DICTIONARY, NOTES, CodedFault, coded_faults, source_of
 from ..gaps import difference
@@ -78,7 +78,10 @@ def with_changed_line(
         proposals = look_up(contestant, report.task, report.method, greeting)
         if proposals is not None and proposals.hint is not None:
             hints = (*report.diagnosis.hints, proposals.hint)
-            return replace(report, diagnosis=replace(report.diagnosis, hints=hints))
+            report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
+            if proposals.hint == UNSTEADY:
+                return report
+            proposals = None  # without a dictionary all lines are searched
     explanations = changed_lines(report, greeting, doubtful, is_known, proposals)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
