@@ -36,7 +36,7 @@ from .words import (
 # Nothing is cut on an endless screen, such as a pipe.
 WIDTH, HEIGHT, ENDLESS = 80, 24, sys.maxsize
 # The most lines of the sentences about a task, and about its smallest failing case, unless a third
-# and an eighth of the screen are more.
+# and an eighth of the screen are more. Beside mistakes, remarks get a twelfth of the screen.
 _EXPLANATION, _COMPLAINT = 6, 3
 _ELLIPSIS = " …"
 # The pieces between which a line may break: words, and single letters of scripts without spaces.
@@ -56,7 +56,8 @@ def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[s
     say = context.say
     bad = [task for task in report.tasks if task.verdict not in GOOD and not is_unwritten(task)]
     screen = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
-    screen += paragraphs(remarks(report), say)
+    notes = paragraphs(remarks(report), say)
+    screen += _shorten(notes, height // 12) if bad else notes
     end = wrapped(say(advice(report.tasks)))
     good = [task for task in report.tasks if task.verdict in GOOD and reservations(task)]
     free = 0 if bad and height < ENDLESS else height - len(screen) - len(end) - 1
