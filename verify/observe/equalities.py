@@ -29,10 +29,9 @@ class Equalities:
             differs = bool((np.asarray(right_gaps) > DIFFERENT).any()) and case not in self._sound
             self._cases.setdefault(equality, {})[case] = holds, differs
 
-    def remove(self, *names: str) -> None:
-        """Forget equalities."""
-        for name in names:
-            self._cases.pop(name, None)
+    def strongest(self) -> list[Statement]:
+        """Return the equality that most right answers do not have, if there is any."""
+        return sorted(self.statements(), key=lambda statement: statement.score)[:1]
 
     def statements(self) -> Iterator[Statement]:
         """Yield the equalities of all answers that right answers do not have in enough cases."""

@@ -5,36 +5,25 @@ answers for the joints below, a point of FABRIK against the point before. Otherw
 joint would spread to all joints below, and its place would not show.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence, Set
+from typing import Any
 
 import numpy as np
 
-from plumbob.reference import quaternion, rotation
+from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray, IndexArray
 
-from ..case import Case
 from ..contestant import Answer
 from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve
 from ..kinematics.textbook import SOLVERS
 from .equalities import Equalities
-from .separation import TOLERANCE, ElementTable
+from .separation import TOLERANCE, ElementTable, Evidence
 
 # Rotations by less count as none [rad]: the sine of half the angle is then about rounding.
 UNROTATED = 1e-7
-# What holds of one sweep alone, and means nothing if a solver makes another number.
-OF_ONE_SWEEP = ("turn", "point")
-EQUALITIES_OF_ONE_SWEEP = ("half_turn", "double_turn", "wrong_axis")
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
-
-
-class JointEvidence(NamedTuple):
-    """Tables by quantity, and equalities."""
-
-    tables: dict[str, ElementTable]
-    equalities: Equalities
 
 
 def sound_cases(judgements: Sequence[CaseJudgement]) -> frozenset[str]:
@@ -65,16 +54,6 @@ def joint_features(inputs: Mapping[str, Any]) -> dict[str, BoolArray]:
     return features
 
 
-def case_features(case: Case) -> dict[str, bool]:
-    """Return the features of a request of inverse kinematics as a whole."""
-    inputs = case.inputs
-    return {
-        "one_sweep": inputs["max_iterations"] == 1,
-        "two_sweeps": inputs["max_iterations"] <= 2,
-        "zero_tolerance": inputs["tolerance"] == 0.0,
-    }
-
-
 def angles(p: FloatArray, q: FloatArray) -> FloatArray:
     """Return the angles between rotations [rad], NaN where a quaternion is none."""
     a, b = _unit(p), _unit(q)
@@ -89,10 +68,24 @@ def _unit(q: FloatArray) -> FloatArray:
     return q / np.sqrt(np.where(squares > 1e-24, squares, np.nan))
 
 
+def _of_parents(values: FloatArray, parents: IndexArray, root: Any) -> FloatArray:
+    """Return the values of each joint's parent, and what stands in their place for the root."""
+    return np.where(parents[:, None] >= 0, values[parents], root)
+
+
+def _at(features: Mapping[str, BoolArray], joints: Any) -> dict[str, BoolArray]:
+    return {name: column[joints] for name, column in features.items()}
+
+
+def _size(offsets: FloatArray) -> float:
+    """Return the length of all links, by which errors are divided [m]."""
+    return float(np.linalg.norm(offsets, axis=1).sum()) + 1e-300
+
+
 # Forward kinematics
 
 
-def forward_evidence(judgements: Sequence[CaseJudgement]) -> JointEvidence:
+def forward_evidence(judgements: Sequence[CaseJudgement]) -> Evidence:
     """Return what answers of forward kinematics show.
 
     A joint without rotation, and a link without length, count for neither side: they are right
@@ -102,98 +95,93 @@ def forward_evidence(judgements: Sequence[CaseJudgement]) -> JointEvidence:
     tables = {name: ElementTable(name, sound) for name in ("rotation", "position")}
     equalities = Equalities(sound)
     for judgement in judgements:
-        assert isinstance(judgement.answer, Answer)
-        pose = ForwardPose(judgement.case.inputs, judgement.answer.values, judgement.expected)
-        _add_forward(judgement.case.name, pose, tables, equalities)
-    return JointEvidence(tables, equalities)
+        _add_forward(ForwardPose(judgement), tables, equalities)
+    return Evidence(tables, equalities.strongest(), [])
 
 
 class ForwardPose:
     """An answered and a right pose of a skeleton, seen from the parent of each joint."""
 
-    def __init__(
-        self, inputs: Mapping[str, Any], outputs: Mapping[str, Any], right: Mapping[str, Any]
-    ) -> None:
-        self.inputs, self.right = inputs, right
-        self.parents = np.asarray(inputs["parents"])
-        self.offsets, self.local = inputs["offsets"], inputs["local_rotations"]
+    def __init__(self, judgement: CaseJudgement) -> None:
+        assert isinstance(judgement.answer, Answer)
+        self.name, outputs = judgement.case.name, judgement.answer.values
+        self.inputs, self.right = judgement.case.inputs, judgement.expected["rotations"]
+        self.parents = np.asarray(self.inputs["parents"])
+        self.offsets, self.local = self.inputs["offsets"], self.inputs["local_rotations"]
         self.positions, self.raw = outputs.get("positions"), outputs.get("rotations")
-        self.size = float(np.linalg.norm(self.offsets, axis=1).sum()) + 1e-300
-        answered = _unit(right["rotations"] if self.raw is None else self.raw)
-        self.rotations = np.where(np.isfinite(answered), answered, right["rotations"])
-        self.is_link = self.parents >= 0
-
-    def of_parent(self, rotations: FloatArray) -> FloatArray:
-        """Return the global rotation of each joint's parent, the identity for the root."""
-        return np.where(self.is_link[:, None], rotations[self.parents], IDENTITY)
+        answered = _unit(self.right if self.raw is None else self.raw)
+        rotations = np.where(np.isfinite(answered), answered, self.right)
+        self.above = _of_parents(rotations, self.parents, IDENTITY)
 
 
 def _add_forward(
-    name: str, pose: ForwardPose, tables: Mapping[str, ElementTable], equalities: Equalities
+    pose: ForwardPose, tables: Mapping[str, ElementTable], equalities: Equalities
 ) -> None:
-    features = joint_features(pose.inputs)
-    parent = pose.of_parent(pose.rotations)
+    features, local, offsets = joint_features(pose.inputs), pose.local, pose.offsets
     if pose.raw is not None:
-        due = rotation.multiply(parent, pose.local)
-        is_rotated = np.abs(pose.local[:, 1:]).max(axis=1) > UNROTATED
-        tables["rotation"].add(name, angles(pose.raw, due), features, is_counted=is_rotated)
-        _add_products(name, pose, parent, equalities)
+        due = rotation.multiply(pose.above, local)
+        is_rotated = np.abs(local[:, 1:]).max(axis=1) > UNROTATED
+        tables["rotation"].add(pose.name, angles(pose.raw, due), features, is_counted=is_rotated)
+        _add_products(pose, pose.raw, equalities)
     if pose.positions is not None:
-        x = pose.positions
-        origin = np.where(pose.is_link[:, None], x[pose.parents], 0.0)
-        due = origin + rotation.rotate(parent, pose.offsets)
-        gaps, is_long = np.abs(x - due).max(axis=1) / pose.size, np.any(pose.offsets, axis=1)
-        tables["position"].add(name, gaps, features, is_counted=is_long)
-        _add_frames(name, pose, x - origin, equalities)
+        links = pose.positions - _of_parents(pose.positions, pose.parents, 0.0)
+        gaps = np.abs(links - rotation.rotate(pose.above, offsets)).max(axis=1) / _size(offsets)
+        is_long = np.any(offsets, axis=1)
+        tables["position"].add(pose.name, gaps, features, is_counted=is_long)
+        _add_frames(pose, links, equalities)
 
 
-def _add_products(name: str, pose: ForwardPose, parent: FloatArray, equalities: Equalities) -> None:
+def _add_products(pose: ForwardPose, raw: FloatArray, equalities: Equalities) -> None:
     """Add other rules by which a joint's rotation may follow from the parent's and its own."""
-    assert pose.raw is not None
-    links, own, raw = pose.is_link, pose.local, pose.raw
     rules = {
-        "own_first": rotation.multiply(own, parent),
-        "parent_alone": parent,
-        "own_alone": own,
+        "own_first": rotation.multiply(pose.local, pose.above),
+        "parent_alone": pose.above,
+        "own_alone": pose.local,
     }
-    values = np.stack([np.broadcast_to(value, own.shape) for value in rules.values()])[:, links]
-    answered, right = (angles(q[links], values) for q in (raw, pose.right["rotations"]))
-    for key, gaps, right_gaps in zip(rules, answered, right, strict=True):
-        equalities.add(key, name, gaps, right_gaps)
+    below = pose.parents >= 0
+    for key, value in rules.items():
+        gaps = (angles(q[below], value[below]) for q in (raw, pose.right))
+        equalities.add(key, pose.name, *gaps)
 
 
-def _add_frames(name: str, pose: ForwardPose, links: FloatArray, equalities: Equalities) -> None:
+def _add_frames(pose: ForwardPose, links: FloatArray, equalities: Equalities) -> None:
     """Add other frames in which a joint's offset may stand; rotations are the right ones."""
-    R, local, parents = pose.right["rotations"], pose.local, pose.parents
-    right = rotation.rotate(pose.of_parent(R), pose.offsets)
+    R, parents, offsets = pose.right, pose.parents, pose.offsets
+    right = rotation.rotate(_of_parents(R, parents, IDENTITY), offsets)
     frames = {
-        "frame_none": np.broadcast_to(IDENTITY, R.shape),
+        "frame_none": IDENTITY,
         "frame_own": R,
-        "frame_parent_local": local[parents],
+        "frame_parent_local": pose.local[parents],
         "frame_inverse": rotation.conjugate(R[parents]),
     }
-    values = rotation.rotate(np.stack(list(frames.values())), pose.offsets[None])
-    for key, value in zip(frames, values, strict=True):
-        gaps = (np.abs(v - value).max(axis=1)[pose.is_link] / pose.size for v in (links, right))
-        equalities.add(key, name, *gaps)
+    for key, frame in frames.items():
+        value = rotation.rotate(np.broadcast_to(frame, R.shape), offsets)
+        gaps = (
+            np.abs(v - value).max(axis=1)[parents >= 0] / _size(offsets) for v in (links, right)
+        )
+        equalities.add(key, pose.name, *gaps)
 
 
 # Inverse kinematics
 
 
-def inverse_evidence(report: TaskReport, judgements: Sequence[CaseJudgement]) -> JointEvidence:
-    """Return what poses of inverse kinematics show; right sweeps are those of the method."""
-    method = _method(report)
-    names = ("agreement", "unmoved", "length", *OF_ONE_SWEEP)
+def inverse_evidence(
+    report: TaskReport, judgements: Sequence[CaseJudgement], unread: Set[str] = frozenset()
+) -> Evidence:
+    """Return what poses of inverse kinematics show; right sweeps are those of the method.
+
+    If `max_iterations` is unread, no answer is that of one sweep.
+    """
+    method = "" if "max_iterations" in unread else _method(report)
     sound, of_cases = sound_cases(judgements), ("root_position", "target", "pose")
-    tables = {name: ElementTable(name, sound) for name in names}
-    tables |= {name: ElementTable(name, sound, is_of_cases=True) for name in of_cases}
-    evidence = JointEvidence(tables, Equalities(sound))
+    names = ("agreement", "unmoved", "length", "turn", "point", *of_cases)
+    tables = {name: ElementTable(name, sound, is_of_cases=name in of_cases) for name in names}
+    equalities = Equalities(sound)
     for judgement in judgements:
-        pose = SolvedPose(judgement, method)
-        if pose.is_valid:
-            _add_pose(pose, evidence)
-    return evidence
+        pose = SolvedPose(judgement, method, tables, equalities)
+        if pose.answer.finite:
+            pose.add()
+    return Evidence(tables, equalities.strongest(), [])
 
 
 def _method(report: TaskReport) -> str:
@@ -209,173 +197,139 @@ def _method(report: TaskReport) -> str:
 
 
 class SolvedPose:
-    """An answered pose, the start, and the right pose where a method has one."""
+    """An answered pose, the start, and the right pose where a method has one.
 
-    def __init__(self, judgement: CaseJudgement, method: str) -> None:
+    Each method adds what the answer shows to tables and equalities.
+    """
+
+    def __init__(
+        self,
+        judgement: CaseJudgement,
+        method: str,
+        tables: Mapping[str, ElementTable],
+        equalities: Equalities,
+    ) -> None:
         assert isinstance(judgement.answer, Answer)
-        self.judgement, self.method = judgement, method
-        self.case, self.inputs = judgement.case, judgement.case.inputs
-        self.name, self.parents = self.case.name, np.asarray(self.inputs["parents"])
-        self.offsets, self.start = self.inputs["offsets"], self.inputs["local_rotations"]
-        self.pose = read_pose(judgement.answer.values, self.inputs, self.case.facts)
-        self.path: IndexArray = self.pose.path
-        self.size = float(np.linalg.norm(self.offsets, axis=1).sum()) + 1e-300
+        case, self.findings = judgement.case, judgement.findings
+        self.name, self.inputs, self.method = case.name, case.inputs, method
+        self.tables, self.equalities = tables, equalities
+        self.parents, self.offsets = np.asarray(case.inputs["parents"]), case.inputs["offsets"]
+        self.start, self.size = case.inputs["local_rotations"], _size(self.offsets)
+        self.features = joint_features(case.inputs)
+        self.answer = read_pose(judgement.answer.values, case.inputs, case.facts)
+        self.path = self.answer.path
         self.local = judgement.answer.values.get("local_rotations")
-        self.effector = int(self.inputs["effector"])
-        self.right_local: FloatArray | None = None
-        self.right_positions: FloatArray | None = None
-        if method and "sweeps" in self.case.facts:
-            self.right_local, self.right_positions, _ = solve(method, self.inputs)
+        self.right = solve(method, case.inputs) if method and "sweeps" in case.facts else None
 
-    @property
-    def is_valid(self) -> bool:
-        """Whether the joints of the path have positions."""
-        return self.pose.finite
+    def add(self) -> None:
+        """Add all that the pose shows."""
+        self._add_whole()
+        if self.answer.answered_positions is not None:
+            self._add_links(self.answer.answered_positions)
+        if self.local is not None:
+            self._add_rotations(self.local)
+        if self.inputs["max_iterations"] == 1 and self.inputs["tolerance"] == 0.0:
+            if self.method == "ccd" and self.answer.local is not None:
+                self._add_turns(self.answer.local)
+            if self.method == "fabrik":
+                self._add_points()
 
-    @property
-    def is_one_sweep(self) -> bool:
-        """Whether a single sweep is asked, which no tolerance ends."""
-        return self.inputs["max_iterations"] == 1 and self.inputs["tolerance"] == 0.0
+    def _add_whole(self) -> None:
+        """Add the position of the root, the target and the pose after all sweeps."""
+        sweeps, y = self.inputs["max_iterations"], self.answer.positions
+        features = {
+            "one_sweep": sweeps == 1,
+            "two_sweeps": sweeps <= 2,
+            "zero_tolerance": self.inputs["tolerance"] == 0.0,
+        }
+        for finding in self.findings:
+            if finding.law == "target reached" and finding.verdict is not Verdict.UNDECIDED:
+                error = float(finding.verdict >= Verdict.WRONG)
+                self.tables["target"].add(self.name, error, features)
+        x = self.answer.answered_positions
+        gap = np.abs((y if x is None else x)[0] - self.offsets[0]).max() / self.size
+        self.tables["root_position"].add(self.name, gap, features)
+        if self.right is not None:
+            gap = np.abs(y - self.right[1])[self.path].max() / self.size
+            allowed = TOLERANCE * sweeps  # rounding adds up over sweeps
+            self.tables["pose"].add(self.name, gap, features, allowed)
 
-    @property
-    def links(self) -> FloatArray | None:
-        """The answered lengths of all links, None without positions."""
-        x = self.pose.answered_positions
-        return None if x is None else np.linalg.norm(x[1:] - x[self.parents[1:]], axis=1)
+    def _add_links(self, x: FloatArray) -> None:
+        """Add the lengths of answered links, and whether they are those of the rotations."""
+        features, above = _at(self.features, slice(1, None)), self.parents[1:]
+        y, links = self.answer.positions, x[1:] - x[above]
+        lengths, due = (np.linalg.norm(v, axis=1) for v in (links, self.offsets[1:]))
+        self.tables["length"].add(self.name, np.abs(lengths - due) / self.size, features)
+        if self.answer.local is not None:
+            gaps = np.abs(links - (y[1:] - y[above])).max(axis=1) / self.size
+            self.tables["agreement"].add(self.name, gaps, features)
 
+    def _add_rotations(self, local: FloatArray) -> None:
+        """Add equalities with the request of joints that have a role, and joints off the path."""
+        changes, path = angles(local, self.start), self.path
+        is_off = ~np.isin(np.arange(len(self.parents)), path)
+        self.tables["unmoved"].add(self.name, changes, self.features, is_counted=is_off)
+        if self.right is None:
+            return
+        right = self.right[0]
+        effector = int(self.inputs["effector"])
+        start, answered, due = map(self._global, (self.start, local, right))
+        kept = changes, angles(right, self.start)
+        carried = angles(answered, start), angles(due, start)
+        for key, joints, (gaps, right_gaps) in (
+            ("root_kept", path[0], kept),
+            ("effector_parent_kept", self.parents[effector], kept),
+            ("inner_kept", path[1:-1], kept),
+            ("effector_global_kept", effector, carried),
+            ("global_answered", path, (angles(local, due), angles(right, due))),
+        ):
+            self.equalities.add(key, self.name, gaps[joints], right_gaps[joints])
 
-def _add_pose(pose: SolvedPose, evidence: JointEvidence) -> None:
-    tables, features = evidence.tables, joint_features(pose.inputs)
-    whole, x = case_features(pose.case), pose.pose.answered_positions
-    y = pose.pose.positions
-    for finding in pose.judgement.findings:
-        if finding.law == "target reached" and finding.verdict is not Verdict.UNDECIDED:
-            tables["target"].add(pose.name, float(finding.verdict >= Verdict.WRONG), whole)
-    root = y if x is None else x
-    gap = np.abs(root[0] - pose.offsets[0]).max() / pose.size
-    tables["root_position"].add(pose.name, gap, whole)
-    if pose.right_positions is not None:
-        gap = np.abs(y - pose.right_positions)[pose.path].max() / pose.size
-        allowed = TOLERANCE * pose.inputs["max_iterations"]  # rounding adds up over sweeps
-        tables["pose"].add(pose.name, gap, whole, allowed)
-    if x is not None:
-        links = {key: column[1:] for key, column in features.items()}
-        due = np.linalg.norm(pose.offsets[1:], axis=1)
-        tables["length"].add(pose.name, np.abs(pose.links - due) / pose.size, links)
-        _add_lengths(pose, evidence.equalities)
-    if pose.local is not None:
-        _add_rotations(pose, evidence, features)
-    if pose.is_one_sweep and pose.method == "ccd" and pose.local is not None:
-        _add_turns(pose, evidence, features)
-    if pose.is_one_sweep and pose.method == "fabrik":
-        _add_points(pose, evidence, features)
+    def _global(self, local: FloatArray) -> FloatArray:
+        unit = np.where(np.isfinite(local), _unit(local), IDENTITY)
+        return forward({**self.inputs, "local_rotations": unit})[1]
 
+    def _add_turns(self, local: FloatArray) -> None:
+        """Add the rotation of each joint in a sweep of CCD, given the answers for joints below."""
+        joints = self.path[-2::-1]
+        if not len(joints) or not np.isfinite(local[self.path]).all():
+            return
+        x, G = forward(self.inputs)
+        ends, above = self._ends(local), _of_parents(G, self.parents, IDENTITY)[joints]
+        to_target = self.inputs["target"] - x[joints]
+        turns = rotation.between(rotation.rotate(G[joints], ends), to_target)
+        due = rotation.multiply(rotation.conjugate(above), rotation.multiply(turns, G[joints]))
+        after = rotation.multiply(above, local[joints])
+        need, turned = angles(turns, IDENTITY), angles(after, G[joints])
+        places = _at(self.features, joints) | {
+            "unrotated_parent": np.abs(above[:, 1:]).max(axis=1) < UNROTATED,
+            "obtuse": need > np.pi / 2.0,
+        }
+        self.tables["turn"].add(self.name, angles(local[joints], due), places)
+        miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
+        self.equalities.add("half_turn", self.name, np.abs(turned - need / 2.0), need / 2.0)
+        self.equalities.add("wrong_axis", self.name, np.abs(turned - need), miss)
 
-def _add_lengths(pose: SolvedPose, equalities: Equalities) -> None:
-    due = np.linalg.norm(pose.offsets, axis=1)[pose.path[1:]]
-    x = pose.pose.answered_positions
-    assert x is not None
-    links = np.linalg.norm(np.diff(x[pose.path], axis=0), axis=1)
-    gaps = (np.abs(lengths[1:] - due[:-1]) / pose.size for lengths in (links, due))
-    equalities.add("length_before", pose.name, *gaps)
+    def _ends(self, local: FloatArray) -> FloatArray:
+        """Return the effector in the frame of each joint of the path, the lowest joint first."""
+        end, ends = np.zeros(3), []
+        for joint in self.path[:0:-1]:
+            end = self.offsets[joint] + rotation.rotate(local[joint], end)
+            ends.append(end)
+        return np.array(ends)
 
-
-def _add_rotations(
-    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
-) -> None:
-    """Add what answered local rotations show, of the path and elsewhere."""
-    local, x, parents = pose.local, pose.pose.answered_positions, pose.parents
-    assert local is not None
-    if x is not None and pose.pose.local is not None:
-        y = pose.pose.positions
-        links = {key: column[1:] for key, column in features.items()}
-        gaps = (x[1:] - x[parents[1:]]) - (y[1:] - y[parents[1:]])
-        evidence.tables["agreement"].add(pose.name, np.abs(gaps).max(axis=1) / pose.size, links)
-    is_moved = np.isin(np.arange(len(parents)), pose.path)
-    gaps = angles(local, pose.start)
-    evidence.tables["unmoved"].add(pose.name, gaps, features, is_counted=~is_moved)
-    if pose.right_local is not None:
-        _add_roles(pose, local, gaps, evidence.equalities)
-
-
-def _add_roles(
-    pose: SolvedPose, local: FloatArray, changes: FloatArray, equalities: Equalities
-) -> None:
-    """Add equalities with the request of joints that have a role, held against right sweeps."""
-    right = pose.right_local
-    assert right is not None
-    right_changes = angles(right, pose.start)
-    path, effector = pose.path, pose.effector
-
-    def add(key: str, joints: Any, gaps: FloatArray, right_gaps: FloatArray) -> None:
-        equalities.add(key, pose.name, gaps[joints], right_gaps[joints])
-
-    add("root_kept", path[0], changes, right_changes)
-    add("effector_parent_kept", int(pose.parents[effector]), changes, right_changes)
-    add("inner_kept", path[1:-1], changes, right_changes)
-    start, answered, due = (_global_rotations(pose, q) for q in (pose.start, local, right))
-    add("effector_global_kept", effector, angles(answered, start), angles(due, start))
-    add("global_answered", path, angles(local, due), angles(right, due))
-
-
-def _global_rotations(pose: SolvedPose, local: FloatArray) -> FloatArray:
-    unit = np.where(np.isfinite(local), _unit(local), IDENTITY)
-    return forward({**pose.inputs, "local_rotations": unit})[1]
-
-
-def _add_turns(
-    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
-) -> None:
-    """Add the rotation of each joint in a sweep of CCD, given the answers for the joints below."""
-    local, joints = pose.pose.local, pose.path[-2::-1]
-    if local is None or not len(joints) or not np.isfinite(local[pose.path]).all():
-        return
-    x, G = forward(pose.inputs)
-    ends = np.array(list(_effector_in_frames(pose, local)))
-    before = np.where(pose.parents[joints, None] >= 0, G[pose.parents[joints]], IDENTITY)
-    to_target = pose.inputs["target"] - x[joints]
-    to_effector = rotation.rotate(G[joints], ends)
-    turns = rotation.between(to_effector, to_target)
-    due = rotation.multiply(rotation.conjugate(before), rotation.multiply(turns, G[joints]))
-    after = rotation.multiply(before, local[joints])
-    need, turned = angles(turns, IDENTITY), angles(after, G[joints])
-    places: dict[str, Any] = {key: column[joints] for key, column in features.items()}
-    is_plain = np.abs(before[:, 1:]).max(axis=1) < UNROTATED
-    places |= {"unrotated_parent": is_plain, "obtuse": need > np.pi / 2.0}
-    evidence.tables["turn"].add(pose.name, angles(local[joints], due), places)
-    miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
-    for key, gaps, right_gaps in (
-        ("half_turn", np.abs(turned - need / 2.0), need / 2.0),
-        ("double_turn", np.abs(turned - np.pi + np.abs(np.pi - 2.0 * need)), need),
-        ("wrong_axis", np.abs(turned - need), miss),
-    ):
-        evidence.equalities.add(key, pose.name, gaps, right_gaps)
-
-
-def _effector_in_frames(pose: SolvedPose, local: FloatArray) -> Iterator[tuple[float, ...]]:
-    """Yield the effector's position in the frame of each joint of the path, the lowest first."""
-    end: tuple[float, ...] = (0.0, 0.0, 0.0)
-    for joint in pose.path[:0:-1]:
-        turned = quaternion.rotate(tuple(local[joint].tolist()), end)
-        end = quaternion.add(tuple(pose.offsets[joint].tolist()), turned)
-        yield end
-
-
-def _add_points(
-    pose: SolvedPose, evidence: JointEvidence, features: Mapping[str, BoolArray]
-) -> None:
-    """Add the points of FABRIK's forward pass, each given the answered point before."""
-    y = pose.pose.positions[pose.path]
-    z = np.array(forward(pose.inputs)[0][pose.path])
-    lengths = np.linalg.norm(pose.offsets, axis=1)[pose.path[1:]]
-    z[-1] = pose.inputs["target"]
-    for k in range(len(z) - 2, -1, -1):
-        z[k] = z[k + 1] + lengths[k] * _direction(z[k] - z[k + 1])
-    due = [b + r * _direction(end - b) for b, r, end in zip(y, lengths, z[1:], strict=False)]
-    if due:
-        gaps = np.abs(y[1:] - np.array(due)).max(axis=1) / pose.size
-        places = {key: column[pose.path[1:]] for key, column in features.items()}
-        evidence.tables["point"].add(pose.name, gaps, places)
+    def _add_points(self) -> None:
+        """Add the points of FABRIK's forward pass, each given the answered point before."""
+        y, path = self.answer.positions[self.path], self.path
+        z = np.array(forward(self.inputs)[0][path])
+        lengths = np.linalg.norm(self.offsets, axis=1)[path[1:]]
+        z[-1] = self.inputs["target"]
+        for k in range(len(z) - 2, -1, -1):
+            z[k] = z[k + 1] + lengths[k] * _direction(z[k] - z[k + 1])
+        due = [b + r * _direction(end - b) for b, r, end in zip(y, lengths, z[1:], strict=False)]
+        if due:
+            gaps = np.abs(y[1:] - np.array(due)).max(axis=1) / self.size
+            self.tables["point"].add(self.name, gaps, _at(self.features, path[1:]))
 
 
 def _direction(v: FloatArray) -> FloatArray:

@@ -4,8 +4,7 @@ They come before the mistakes that a catalogue has, are true of all the answers 
 need no knowledge of mistakes. The verdict never depends on them.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,15 +16,8 @@ from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics import forward_kinematics, inverse_kinematics
 from ..mass_spring import forces
 from . import inputs, requests
-from .joints import (
-    EQUALITIES_OF_ONE_SWEEP,
-    OF_ONE_SWEEP,
-    JointEvidence,
-    forward_evidence,
-    inverse_evidence,
-    sound_cases,
-)
-from .separation import ElementTable, Statement, joined, separation
+from .joints import forward_evidence, inverse_evidence, sound_cases
+from .separation import ElementTable, Evidence, Statement, joined, separation
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
@@ -34,13 +26,6 @@ TASKS = (forward_kinematics.TASK, inverse_kinematics.TASK, forces.TASK, STEP)
 MIN_ANSWERS = 14
 # The most sentences before the one about what is right, and the most quantities in that.
 SENTENCES, RIGHT = 3, 4
-
-
-class Findings(NamedTuple):
-    """Statements in their order, the strongest first, and what is right everywhere."""
-
-    statements: Sequence[Statement]
-    right: Sequence[Sentence]
 
 
 def observe(contestant: Contestant, report: TaskReport, seed: int) -> tuple[Sentence, ...]:
@@ -80,13 +65,15 @@ def sentences(
     unread: Sequence[str] = (),
 ) -> tuple[Sentence, ...]:
     """Return what answers show, given the inputs that they do not depend on."""
-    findings = FINDINGS[report.task](report, judgements, greeting, unread)
+    evidence = _evidence(report, judgements, greeting.epsilon, unread)
+    tables, equations = list(evidence.tables.values()), sorted(evidence.statements, key=_score)
+    # the places say more than the statements before if they are exact
+    places = [place for place in of_tables(tables) if place.is_exact or not equations]
     first = [inputs.statement_of(unread)] if unread else []
-    words = [statement.sentence for statement in (*first, *findings.statements)][:SENTENCES]
-    if words and findings.right:
-        words.append(
-            sentence("Right everywhere: {quantities}.", quantities=joined(findings.right[:RIGHT]))
-        )
+    words = [statement.sentence for statement in (*first, *equations, *places)][:SENTENCES]
+    right = [*evidence.right, *(table.right_words() for table in tables if table.is_right)][:RIGHT]
+    if words and right:
+        words.append(sentence("Right everywhere: {quantities}.", quantities=joined(right)))
     return tuple(words)
 
 
@@ -111,55 +98,12 @@ def _score(statement: Statement) -> float:
     return statement.score
 
 
-def _of_joints(evidence: JointEvidence, unread: Sequence[str]) -> Findings:
-    tables, equalities = evidence.tables, evidence.equalities
-    if "max_iterations" in unread:  # then no answer is that of one sweep
-        tables = {k: table for k, table in tables.items() if k not in (*OF_ONE_SWEEP, "pose")}
-        equalities.remove(*EQUALITIES_OF_ONE_SWEEP)
-    by_count = sorted(equalities.statements(), key=_score)
-    right = [table.right_words() for table in tables.values() if table.is_right]
-    return Findings([*by_count[:1], *_beside(by_count, of_tables([*tables.values()]))], right)
-
-
-def _beside(first: Sequence[Statement], places: Sequence[Statement]) -> list[Statement]:
-    """Return the places that say more than the statements before: exact ones, or all."""
-    return [place for place in places if place.is_exact or not first]
-
-
-def _of_forward(
-    report: TaskReport,
-    judgements: Sequence[CaseJudgement],
-    greeting: Greeting,
-    unread: Sequence[str],
-) -> Findings:
-    return _of_joints(forward_evidence(judgements), unread)
-
-
-def _of_inverse(
-    report: TaskReport,
-    judgements: Sequence[CaseJudgement],
-    greeting: Greeting,
-    unread: Sequence[str],
-) -> Findings:
-    return _of_joints(inverse_evidence(report, judgements), unread)
-
-
-def _of_springs(
-    report: TaskReport,
-    judgements: Sequence[CaseJudgement],
-    greeting: Greeting,
-    unread: Sequence[str],
-) -> Findings:
-    evidence = spring_evidence(judgements, greeting.epsilon, sound_cases(judgements))
-    tables = list(evidence.tables.values())
-    equations = sorted(evidence.statements, key=_score)
-    right = [*evidence.right, *(table.right_words() for table in tables if table.is_right)]
-    return Findings([*equations, *_beside(equations, of_tables(tables))], right)
-
-
-FINDINGS: Mapping[str, Callable[..., Findings]] = {
-    forward_kinematics.TASK: _of_forward,
-    inverse_kinematics.TASK: _of_inverse,
-    forces.TASK: _of_springs,
-    STEP: _of_springs,
-}
+def _evidence(
+    report: TaskReport, judgements: Sequence[CaseJudgement], epsilon: float, unread: Sequence[str]
+) -> Evidence:
+    """Return what the answers to a task show; `epsilon` is their precision."""
+    if report.task == forward_kinematics.TASK:
+        return forward_evidence(judgements)
+    if report.task == inverse_kinematics.TASK:
+        return inverse_evidence(report, judgements, {*unread})
+    return spring_evidence(judgements, epsilon, sound_cases(judgements))

@@ -118,6 +118,14 @@ class ElementTable:
         return sentence("{quantity} ({count})", quantity=self.quantity, count=len(self.elements))
 
 
+class Evidence(NamedTuple):
+    """Tables by quantity, statements by equations, and what equations show to be right."""
+
+    tables: dict[str, ElementTable]
+    statements: list[Statement]
+    right: list[Sentence]
+
+
 def separation(table: ElementTable) -> Statement | None:
     """Return the feature of all wrong elements and no others, else a one-sided one, else None.
 

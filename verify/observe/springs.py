@@ -6,7 +6,7 @@ of few terms with one coefficient each.
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence, Set
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from .pulls import (
     readings_of,
     solve_pulls,
 )
-from .separation import MIN_CASES, TOLERANCE, ElementTable, Statement, words_of
+from .separation import MIN_CASES, TOLERANCE, ElementTable, Evidence, Statement, words_of
 
 # An equation needs so many springs more than it has terms to have three terms.
 SPRINGS_FOR_THREE = 25
@@ -37,21 +37,13 @@ SAME_GRAVITY, OTHER_GRAVITY = 1e-4, 0.1
 KINDS = ("damped_spring", "compressed_spring", "spring_to_pin")
 
 
-class SpringEvidence(NamedTuple):
-    """Tables, statements by equations, and what is right."""
-
-    tables: dict[str, ElementTable]
-    statements: list[Statement]
-    right: list[Sentence]
-
-
 def spring_evidence(
     judgements: Sequence[CaseJudgement], epsilon: float, sound: Set[str] = frozenset()
-) -> SpringEvidence:
+) -> Evidence:
     """Return what answers show; `sound` are the names of the cases with a right verdict."""
     cases = [SpringCase(judgement, epsilon) for judgement in judgements]
     cases = [case for case in cases if _is_finite(case)]
-    evidence = SpringEvidence({}, [], [])
+    evidence = Evidence({}, [], [])
     solved: dict[str, list[Pulls]] = defaultdict(list)
     residuals: dict[tuple[str, str], dict[str, FloatArray]] = defaultdict(dict)
     for case in cases:
@@ -91,7 +83,7 @@ def _add_motion(
     cases: Sequence[SpringCase],
     residuals: Mapping[tuple[str, str], Mapping[str, FloatArray]],
     sound: Set[str],
-    evidence: SpringEvidence,
+    evidence: Evidence,
 ) -> None:
     """Add the right equation of motion, read in the way in which most particles keep it."""
     best = max(residuals, key=lambda key: _right_share(residuals[key]))
@@ -137,7 +129,7 @@ def _residuals(case: SpringCase, reading: ForceReading) -> Iterator[tuple[str, F
 # What springs pull
 
 
-def _add_pulls(name: str, solved: Sequence[Pulls], evidence: SpringEvidence) -> None:
+def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Evidence) -> None:
     pulls = np.concatenate([part.pulls for part in solved])
     symbols = [symbol for symbol in PULLS if symbol not in OF_STEPS or name != "forces"]
     terms = {symbol: np.concatenate([p.terms[symbol] for p in solved]) for symbol in symbols}
@@ -181,7 +173,7 @@ def _add_kinds(
     pulls: FloatArray,
     terms: Mapping[str, FloatArray],
     count: Mapping[str, Any],
-    evidence: SpringEvidence,
+    evidence: Evidence,
 ) -> None:
     """Add the sums of springs with and without a feature, or that there is no plain sum."""
     cases = np.concatenate([np.full(len(part.pulls), i) for i, part in enumerate(solved)])
@@ -207,7 +199,7 @@ def _add_kinds(
         evidence.statements.append(Statement(5.0, words, is_exact=False))
 
 
-def _add_gravity(solved: Sequence[Pulls], evidence: SpringEvidence) -> None:
+def _add_gravity(solved: Sequence[Pulls], evidence: Evidence) -> None:
     pairs = [(part.gravity, part.case.gravity) for part in solved if part.gravity is not None]
     if len(pairs) < MIN_CASES:
         return
@@ -224,7 +216,7 @@ def _add_gravity(solved: Sequence[Pulls], evidence: SpringEvidence) -> None:
 # Sums of velocities and displacements
 
 
-def _add_flights(cases: Sequence[SpringCase], evidence: SpringEvidence) -> None:
+def _add_flights(cases: Sequence[SpringCase], evidence: Evidence) -> None:
     """Add what moves free particles without springs."""
     hs, gs = {case.h for case in cases}, {tuple(case.gravity) for case in cases}
     is_step = any(case.forces is None for case in cases)
@@ -295,7 +287,7 @@ VELOCITY_TERMS: Mapping[str, Any] = {
 }
 
 
-def _add_velocities(cases: Sequence[SpringCase], evidence: SpringEvidence) -> None:
+def _add_velocities(cases: Sequence[SpringCase], evidence: Evidence) -> None:
     """Add of which differences of positions and old velocities the new ones are a sum."""
     cases = [c for c in cases if c.end is not None and c.end_v is not None and len(c.free)]
     cases = [case for case in cases if not case.problem.external.any()]
