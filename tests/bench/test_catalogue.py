@@ -45,6 +45,7 @@ def test_a_new_step_solver_takes_part_in_every_suite_of_steps():
     assert catalogue.find("Plumbob damped global").engine == catalogue.PLUMBOB
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("damped")
 def test_a_new_step_solver_stands_in_the_tables(make):
     name = ("cloth/x1/one step", "damped_global")

@@ -83,7 +83,7 @@ SOLVERS = {
 }
 
 
-@pytest.mark.sample("fabrik")
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SOLVERS)
 def test_constant_iterations_and_tolerance_are_found_and_said(name):
     solver, method, count = SOLVERS[name]

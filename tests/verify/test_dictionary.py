@@ -147,6 +147,7 @@ def test_a_second_mistake_in_another_request_hides_no_first():
 
 
 @pytest.mark.usefixtures("verdict_alone")
+@pytest.mark.sample("1.0")
 @pytest.mark.parametrize("factor", [1.0, 1.1])
 def test_cases_decide_what_is_named(factor):
     """A proposal that does not give the answers to the cases is not named."""

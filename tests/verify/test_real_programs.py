@@ -74,7 +74,7 @@ def has_words(screen, words):
     return all(any(word.lower() in text for word in forms) for forms in words)
 
 
-@pytest.mark.sample("reversed", "nodes", "points", "glm_right")
+@pytest.mark.sample("nodes", "points")
 @pytest.mark.parametrize("name", TRUTH)
 def test_a_program_gets_its_verdict_and_its_words(name, tmp_path, monkeypatch):
     truth = TRUTH[name]

@@ -128,6 +128,7 @@ def test_a_fault_of_fabrik_is_named_by_another_rule(key):
     assert key in named(judged(INVERSE, function, "fabrik"))[0]
 
 
+@pytest.mark.sample("-ccd")
 @pytest.mark.sweep("name", lambda: SHARED, every=100)
 @pytest.mark.parametrize("method", ["forward", "ccd", "fabrik"])
 def test_a_fault_of_quaternions_is_named_in_every_grouping(method, name):
