@@ -172,8 +172,8 @@ def inverse_evidence(
 
     If `max_iterations` is unread, no answer is that of one sweep.
     """
-    method = "" if "max_iterations" in unread else _method(report)
-    sound, of_cases = sound_cases(judgements), ("root_position", "target", "pose")
+    method, reads_sweeps = _method(report), "max_iterations" not in unread
+    sound, of_cases = sound_cases(judgements), ("root_position", "pose")
     names = ("agreement", "unmoved", "length", "turn", "point", *of_cases)
     tables = {name: ElementTable(name, sound, is_of_cases=name in of_cases) for name in names}
     equalities = Equalities(sound)
@@ -181,6 +181,8 @@ def inverse_evidence(
         pose = SolvedPose(judgement, method, tables, equalities)
         if pose.answer.finite:
             pose.add()
+        if pose.answer.finite and reads_sweeps:
+            pose.add_sweeps()
     return Evidence(tables, equalities.strongest(), [])
 
 
@@ -210,7 +212,7 @@ class SolvedPose:
         equalities: Equalities,
     ) -> None:
         assert isinstance(judgement.answer, Answer)
-        case, self.findings = judgement.case, judgement.findings
+        case = judgement.case
         self.name, self.inputs, self.method = case.name, case.inputs, method
         self.tables, self.equalities = tables, equalities
         self.parents, self.offsets = np.asarray(case.inputs["parents"]), case.inputs["offsets"]
@@ -222,37 +224,36 @@ class SolvedPose:
         self.right = solve(method, case.inputs) if method and "sweeps" in case.facts else None
 
     def add(self) -> None:
-        """Add all that the pose shows."""
-        self._add_whole()
-        if self.answer.answered_positions is not None:
-            self._add_links(self.answer.answered_positions)
+        """Add what the pose shows whatever the number of sweeps."""
+        x = self.answer.answered_positions
+        root = (self.answer.positions if x is None else x)[0]
+        gap = np.abs(root - self.offsets[0]).max() / self.size
+        self.tables["root_position"].add(self.name, gap, self._whole())
+        if x is not None:
+            self._add_links(x)
         if self.local is not None:
             self._add_rotations(self.local)
+
+    def add_sweeps(self) -> None:
+        """Add the pose after all sweeps, and what a single sweep shows, which no tolerance ends."""
+        if self.right is not None:
+            gap = np.abs(self.answer.positions - self.right[1])[self.path].max() / self.size
+            allowed = TOLERANCE * self.inputs["max_iterations"]  # rounding adds up over sweeps
+            self.tables["pose"].add(self.name, gap, self._whole(), allowed)
         if self.inputs["max_iterations"] == 1 and self.inputs["tolerance"] == 0.0:
             if self.method == "ccd" and self.answer.local is not None:
                 self._add_turns(self.answer.local)
             if self.method == "fabrik":
                 self._add_points()
 
-    def _add_whole(self) -> None:
-        """Add the position of the root, the target and the pose after all sweeps."""
-        sweeps, y = self.inputs["max_iterations"], self.answer.positions
-        features = {
+    def _whole(self) -> dict[str, bool]:
+        """Return the features of the request as a whole."""
+        sweeps = self.inputs["max_iterations"]
+        return {
             "one_sweep": sweeps == 1,
             "two_sweeps": sweeps <= 2,
             "zero_tolerance": self.inputs["tolerance"] == 0.0,
         }
-        for finding in self.findings:
-            if finding.law == "target reached" and finding.verdict is not Verdict.UNDECIDED:
-                error = float(finding.verdict >= Verdict.WRONG)
-                self.tables["target"].add(self.name, error, features)
-        x = self.answer.answered_positions
-        gap = np.abs((y if x is None else x)[0] - self.offsets[0]).max() / self.size
-        self.tables["root_position"].add(self.name, gap, features)
-        if self.right is not None:
-            gap = np.abs(y - self.right[1])[self.path].max() / self.size
-            allowed = TOLERANCE * sweeps  # rounding adds up over sweeps
-            self.tables["pose"].add(self.name, gap, features, allowed)
 
     def _add_links(self, x: FloatArray) -> None:
         """Add the lengths of answered links, and whether they are those of the rotations."""

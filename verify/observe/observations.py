@@ -10,18 +10,20 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence, sentence
 
+from ..case import Case
 from ..contestant import Answer, Contestant, is_hung
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, TaskReport, Verdict
-from ..kinematics import forward_kinematics, inverse_kinematics
+from ..kinematics import forward_kinematics, problems
 from ..mass_spring import forces
-from . import inputs, requests
+from ..mass_spring.cases import telling_cases as spring_cases
+from . import inputs
 from .joints import forward_evidence, inverse_evidence, sound_cases
 from .separation import ElementTable, Evidence, Statement, joined, separation
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
-TASKS = (forward_kinematics.TASK, inverse_kinematics.TASK, forces.TASK, STEP)
+TASKS = (forward_kinematics.TASK, problems.TASK, forces.TASK, STEP)
 # Fewer cases let chance speak: of 5 random cases 27 % of the statements were false on all cases.
 MIN_ANSWERS = 14
 # The most sentences before the one about what is right, and the most quantities in that.
@@ -44,8 +46,8 @@ def observe(contestant: Contestant, report: TaskReport, seed: int) -> tuple[Sent
     ):
         return ()
     method, greeting = report.method.lower(), report.greeting or contestant.greeting
-    cases = requests.telling_cases(report.task, greeting, report.method, seed)
-    answered += requests.ask(contestant, cases, method)
+    cases = _telling_cases(report, greeting, seed)
+    answered += _ask(contestant, cases, method)
     counted = [judgement.case for judgement in report.judgements]
     unread = inputs.unread_inputs(contestant, counted, greeting, method)
     with np.errstate(all="ignore"):
@@ -56,6 +58,29 @@ def _is_usable(judgement: CaseJudgement) -> bool:
     """Return whether a case has an answer, and one right answer alone."""
     is_must = judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
     return is_must and isinstance(judgement.answer, Answer)
+
+
+def _telling_cases(report: TaskReport, greeting: Greeting, seed: int) -> list[Case]:
+    """Return requests that tell more than the cases and suit the solver, never counted."""
+    if report.task in (forward_kinematics.TASK, problems.TASK):
+        module = forward_kinematics if report.task == forward_kinematics.TASK else problems
+        return module.telling_cases(greeting, report.method, seed)
+    return spring_cases(report.task, greeting, seed)
+
+
+def _ask(contestant: Contestant, cases: Sequence[Case], method: str) -> list[CaseJudgement]:
+    """Return the answers to requests, with the right ones of kinematics, and without findings.
+
+    After a request without an answer no more are sent: the solver may crash or hang.
+    """
+    judgements = []
+    for case in cases:
+        answer = contestant.answer(case)
+        if not isinstance(answer, Answer):
+            break
+        expected = inputs.right_answer(case, method) if case.task == forward_kinematics.TASK else {}
+        judgements.append(CaseJudgement(case, answer, (), expected))
+    return judgements
 
 
 def sentences(
@@ -104,6 +129,6 @@ def _evidence(
     """Return what the answers to a task show; `epsilon` is their precision."""
     if report.task == forward_kinematics.TASK:
         return forward_evidence(judgements)
-    if report.task == inverse_kinematics.TASK:
+    if report.task == problems.TASK:
         return inverse_evidence(report, judgements, {*unread})
     return spring_evidence(judgements, epsilon, sound_cases(judgements))

@@ -15,7 +15,7 @@ from plumbob.text.sentence import Sentence, sentence
 
 from ..contestant import Answer
 from ..judgement import CaseJudgement
-from ..mass_spring.problem import SpringProblem, problem_of
+from ..mass_spring.problem import problem_of
 from .fits import INDEPENDENT
 from .separation import TOLERANCE
 
@@ -50,30 +50,14 @@ class SpringCase:
 
     def __init__(self, judgement: CaseJudgement, epsilon: float) -> None:
         assert isinstance(judgement.answer, Answer)
-        self.name, self.case = judgement.case.name, judgement.case
-        self.problem: SpringProblem = problem_of(judgement.case.inputs)
-        p, outputs = self.problem, judgement.answer.values
+        self.name, outputs = judgement.case.name, judgement.answer.values
+        p = self.problem = problem_of(judgement.case.inputs)
         self.x, self.v, self.h = p.positions, p.velocities, p.h or 1.0
         self.masses, self.gravity = p.masses[:, None], p.gravity
         self.free = np.setdiff1d(np.arange(p.count), p.pinned)
+        self.acting = (p.stiffnesses > 0.0) | (p.dampings > 0.0)  # springs with either
         self.end, self.end_v = outputs.get("positions"), outputs.get("velocities")
-        self.forces = outputs.get("forces")
-        self.epsilon = epsilon
-
-    @cached_property
-    def acting(self) -> BoolArray:
-        """The springs with a stiffness or a damping."""
-        return (self.problem.stiffnesses > 0.0) | (self.problem.dampings > 0.0)
-
-    def by_positions(self) -> FloatArray | None:
-        """Return the force that moves positions further than the old velocities [N]."""
-        if self.end is None:
-            return None
-        return self.masses * (self.end - self.x - self.h * self.v) / self.h**2
-
-    def by_velocities(self) -> FloatArray | None:
-        """Return the force that changes velocities [N]."""
-        return None if self.end_v is None else self.masses * (self.end_v - self.v) / self.h
+        self.forces, self.epsilon = outputs.get("forces"), epsilon
 
     def rounding(self) -> float:
         """Return the error of such a force that rounding of the answers leaves [N]."""
@@ -92,27 +76,18 @@ class SpringCase:
 
     def features(self) -> dict[str, bool]:
         """Return the features of the case as a whole."""
-        p, acting = self.problem, self.acting
-        lengths = np.linalg.norm(p.incidence @ self.x, axis=1)
+        springs = int(self.acting.sum())
         return {
-            "springs": bool(acting.any()),
-            "several_springs": int(acting.sum()) > 1,
-            "pins": bool(len(p.pinned)),
-            "dampers": p.damped,
-            "compressed": bool((acting & (lengths < p.rest_lengths - 1e-9)).any()),
+            "springs": springs > 0,
+            "several_springs": springs > 1,
+            "pins": bool(len(self.problem.pinned)),
+            "dampers": self.problem.damped,
         }
 
     def particle_features(self) -> dict[str, BoolArray]:
         """Return the features of all particles."""
-        p, indices = self.problem, np.arange(self.problem.count)
-        touches = p.incidence[self.acting] != 0.0
-        is_at_pin = touches[:, p.pinned].any(axis=1)
-        return {
-            "several_springs_here": touches.sum(axis=0) > 1,
-            "next_to_pin": touches[is_at_pin].any(axis=0),
-            "first_particle": indices == 0,
-            "last_particle": indices == p.count - 1,
-        }
+        touches = self.problem.incidence[self.acting] != 0.0
+        return {"several_springs_here": touches.sum(axis=0) > 1}
 
 
 class ForceReading:
@@ -128,17 +103,15 @@ class ForceReading:
     """
 
     def __init__(
-        self, name: str, case: "SpringCase", force: FloatArray, x: FloatArray, v: FloatArray
+        self, name: str, case: SpringCase, force: FloatArray, x: FloatArray, v: FloatArray
     ) -> None:
         p, acting = case.problem, case.acting
         self.name, self.force, self.h = name, force, case.h
-        first, second = p.springs[acting].T
-        d, w, start = (values[first] - values[second] for values in (x, v, case.x))
-        self.l = np.sqrt((d * d).sum(axis=1))
+        d, w, start = (p.incidence[acting] @ values for values in (x, v, case.x))
+        self.l, self.first_length = (np.linalg.norm(edges, axis=1) for edges in (d, start))
         self.u = d / np.maximum(self.l, 1e-300)[:, None]
         self.k, self.c, self.r = p.stiffnesses[acting], p.dampings[acting], p.rest_lengths[acting]
         self.rate = (w * self.u).sum(axis=1)
-        self.first_length = np.sqrt((start * start).sum(axis=1))
 
     def terms(self) -> dict[str, FloatArray]:
         """Return what springs may pull, by symbols."""
@@ -160,23 +133,24 @@ READINGS: Mapping[str, Sentence] = {
 
 def readings_of(case: SpringCase) -> Iterator[ForceReading]:
     """Yield the force of an answer with springs at the start and at the end of the step."""
+    x, v, h, end = case.x, case.v, case.h, case.end
     if case.forces is not None:
-        yield ForceReading("forces", case, case.forces, case.x, case.v)
-    by_x, by_v, x, end = case.by_positions(), case.by_velocities(), case.x, case.end
-    if by_x is not None and end is not None:
-        yield ForceReading("start", case, by_x, x, case.v)
-        yield ForceReading("end", case, by_x, end, (end - x) / case.h)
-    if by_v is not None:
-        yield ForceReading("start, velocities", case, by_v, x, case.v)
+        yield ForceReading("forces", case, case.forces, x, v)
+    if end is not None:
+        by_x = case.masses * (end - x - h * v) / h**2
+        yield ForceReading("start", case, by_x, x, v)
+        yield ForceReading("end", case, by_x, end, (end - x) / h)
+    if case.end_v is not None:
+        by_v = case.masses * (case.end_v - v) / h
+        yield ForceReading("start, velocities", case, by_v, x, v)
         if end is not None:
-            yield ForceReading("end, velocities", case, by_v, end, case.v)
+            yield ForceReading("end, velocities", case, by_v, end, v)
     # a damper is read in other directions than a spring in an iteration: leave such cases out
-    if by_x is not None and end is not None and not case.problem.damped:
+    if end is not None and not case.problem.damped:
         p = case.problem
-        pulls = p.stiffnesses[:, None] * (end[p.springs[:, 0]] - end[p.springs[:, 1]])
-        stretched = by_x + p.incidence.T @ pulls
-        yield ForceReading("rest directions", case, stretched, x, case.v)
-        yield ForceReading("rest directions from y", case, stretched, x + case.h * case.v, case.v)
+        stretched = by_x + p.incidence.T @ (p.stiffnesses[:, None] * (p.incidence @ end))
+        yield ForceReading("rest directions", case, stretched, x, v)
+        yield ForceReading("rest directions from y", case, stretched, x + h * v, v)
 
 
 class Pulls(NamedTuple):
@@ -214,7 +188,6 @@ def solve_pulls(case: SpringCase, reading: ForceReading) -> Pulls | None:
     features = {
         "damped_spring": reading.c > 0.0,
         "compressed_spring": reading.first_length < reading.r,
-        "spring_to_pin": np.isin(p.springs[acting], p.pinned).any(axis=1),
     }
     gravity = solution[count:] if is_measured else None
     return Pulls(case, solution[:count], gravity, reading.terms(), features)

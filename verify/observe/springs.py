@@ -34,7 +34,7 @@ SPRINGS_FOR_THREE = 25
 # A gravity is constant if it differs by less between answers [m/s²], requests by more.
 SAME_GRAVITY, OTHER_GRAVITY = 1e-4, 0.1
 # Of which springs the pull may differ from that of the others.
-KINDS = ("damped_spring", "compressed_spring", "spring_to_pin")
+KINDS = ("damped_spring", "compressed_spring")
 
 
 def spring_evidence(
@@ -216,25 +216,44 @@ def _add_gravity(solved: Sequence[Pulls], evidence: Evidence) -> None:
 # Sums of velocities and displacements
 
 
+def _sum_of(
+    cases: Sequence[SpringCase], quantity: Any, symbols: Sequence[str]
+) -> list[Term] | None:
+    """Return the fewest terms that are a quantity of all free particles."""
+    return fit(_stacked(cases, quantity), {s: _stacked(cases, TERMS[s]) for s in symbols}, 2)
+
+
+def _stacked(cases: Sequence[SpringCase], rule: Any) -> FloatArray:
+    """Return a quantity of all free particles, of each case over the size of its velocities."""
+    parts = [(rule(c) + 0.0 * c.x)[c.free].ravel() / _speed(c) for c in cases]
+    return np.concatenate(parts)
+
+
+def _speed(case: SpringCase) -> float:
+    """Return the size of the velocities of a case, and of what gravity adds, 1 if all are zero."""
+    velocities = case.v, case.h * case.gravity, 0.0 if case.end_v is None else case.end_v
+    return max(float(np.abs(v).max()) for v in velocities) or 1.0
+
+
+def _differ(cases: Sequence[SpringCase]) -> bool:
+    """Return whether requests have two time steps, if they have any, and two gravities."""
+    hs, gs = {case.h for case in cases}, {tuple(case.gravity) for case in cases}
+    return len(gs) > 1 and (len(hs) > 1 or all(case.forces is not None for case in cases))
+
+
 def _add_flights(cases: Sequence[SpringCase], evidence: Evidence) -> None:
     """Add what moves free particles without springs."""
-    hs, gs = {case.h for case in cases}, {tuple(case.gravity) for case in cases}
-    is_step = any(case.forces is None for case in cases)
-    if len(cases) < 2 or len(gs) < 2 or (is_step and len(hs) < 2):
+    if not _differ(cases):
         return
-    for name, quantity, dues in FLIGHTS:
-        parts = [quantity(case) for case in cases]
-        if any(part is None for part in parts) or not parts:
+    for name, quantity, symbols, dues in FLIGHTS:
+        if any(quantity(case) is None for case in cases):
             continue
-        symbols = FORCE_TERMS if name == "f" else STEP_TERMS
-        columns = {s: _stacked(cases, rule) for s, rule in symbols.items()}
-        y = np.concatenate([part[c.free].ravel() for part, c in zip(parts, cases, strict=True)])
-        fitted = fit(y, columns, 2)
+        fitted = _sum_of(cases, quantity, symbols)
         if fitted is None:
             continue
         if any(is_sum(fitted, due) for due in dues):
-            evidence.right.append(sentence(
-                "{name} without springs ({count} cases)", name=name, count=len(cases)))  # fmt: skip
+            words = sentence("{name} without springs ({count} cases)", name=name, count=len(cases))
+            evidence.right.append(words)
             continue
         evidence.statements.append(_of_fit(sentence(
             "Without springs {name} = {formula}; right is {right} ({count} cases, g: gravity).",
@@ -242,23 +261,8 @@ def _add_flights(cases: Sequence[SpringCase], evidence: Evidence) -> None:
             right=formula([Term(c, s) for s, c in dues[0].items()]))))  # fmt: skip
 
 
-def _stacked(cases: Sequence[SpringCase], rule: Any) -> FloatArray:
-    return np.concatenate([(rule(case) + 0.0 * case.x)[case.free].ravel() for case in cases])
-
-
-def _scaled(cases: Sequence[SpringCase], rule: Any) -> FloatArray:
-    """Return a quantity of all free particles, of each case over its largest velocity."""
-    return _stacked(cases, lambda case: rule(case) / max(np.abs(case.end_v).max(), 1e-300))
-
-
-# What free particles may be moved by: the quantity, and its right sums, the usual one first.
-FLIGHTS: Sequence[tuple[str, Any, Sequence[Mapping[str, float]]]] = (
-    ("x' - x", lambda c: None if c.end is None else c.end - c.x,
-     ({"h v": 1.0, "h² g": 1.0}, {"h v": 1.0}, {"h v": 1.0, "h² g": 0.5})),
-    ("v' - v", lambda c: None if c.end_v is None else c.end_v - c.v, ({"h g": 1.0},)),
-    ("f", lambda c: c.forces, ({"m g": 1.0},)),
-)  # fmt: skip
-STEP_TERMS: Mapping[str, Any] = {
+UP = np.array([0.0, 1.0, 0.0])
+TERMS: Mapping[str, Any] = {
     "h v": lambda c: c.h * c.v,
     "h² g": lambda c: c.h**2 * c.gravity,
     "h g": lambda c: c.h * c.gravity,
@@ -267,44 +271,45 @@ STEP_TERMS: Mapping[str, Any] = {
     "h² v": lambda c: c.h**2 * c.v,
     "h² g/m": lambda c: c.h**2 * c.gravity / c.masses,
     "h g/m": lambda c: c.h * c.gravity / c.masses,
-    "h² (0, 1, 0)": lambda c: c.h**2 * np.array([0.0, 1.0, 0.0]),
-    "h (0, 1, 0)": lambda c: c.h * np.array([0.0, 1.0, 0.0]),
-}
-FORCE_TERMS: Mapping[str, Any] = {
+    "h² (0, 1, 0)": lambda c: c.h**2 * UP,
+    "h (0, 1, 0)": lambda c: c.h * UP,
     "m g": lambda c: c.masses * c.gravity,
-    "g": lambda c: c.gravity,
     "m² g": lambda c: c.masses**2 * c.gravity,
-    "m (0, 1, 0)": lambda c: c.masses * np.array([0.0, 1.0, 0.0]),
-}
-VELOCITY_TERMS: Mapping[str, Any] = {
+    "m (0, 1, 0)": lambda c: c.masses * UP,
     "(x' - x)/h": lambda c: (c.end - c.x) / c.h,
-    "v": lambda c: c.v,
-    "h g": lambda c: c.h * c.gravity,
     "x' - x": lambda c: c.end - c.x,
     "(x' - x)/h²": lambda c: (c.end - c.x) / c.h**2,
-    "g": lambda c: c.gravity,
-    "h (0, 1, 0)": lambda c: c.h * np.array([0.0, 1.0, 0.0]),
 }
+OF_FORCES = ("m g", "g", "m² g", "m (0, 1, 0)")
+OF_MOTION = tuple(TERMS)[:10]
+OF_VELOCITIES = ("(x' - x)/h", "v", "h g", "x' - x", "(x' - x)/h²", "g", "h (0, 1, 0)")
+# What free particles may be moved by: quantity, terms and right sums, the usual sum first.
+FLIGHTS: Sequence[tuple[str, Any, Sequence[str], Sequence[Mapping[str, float]]]] = (
+    ("x' - x", lambda c: None if c.end is None else c.end - c.x, OF_MOTION,
+     ({"h v": 1.0, "h² g": 1.0}, {"h v": 1.0}, {"h v": 1.0, "h² g": 0.5})),
+    ("v' - v", lambda c: None if c.end_v is None else c.end_v - c.v, OF_MOTION, ({"h g": 1.0},)),
+    ("f", lambda c: c.forces, OF_FORCES, ({"m g": 1.0},)),
+)  # fmt: skip
 
 
 def _add_velocities(cases: Sequence[SpringCase], evidence: Evidence) -> None:
     """Add of which differences of positions and old velocities the new ones are a sum."""
     cases = [c for c in cases if c.end is not None and c.end_v is not None and len(c.free)]
     cases = [case for case in cases if not case.problem.external.any()]
-    hs, gs = {case.h for case in cases}, {tuple(case.gravity) for case in cases}
-    if len(cases) < MIN_CASES or len(hs) < 2 or len(gs) < 2:
+    if len(cases) < MIN_CASES or not _differ(cases):
         return
-    columns = {symbol: _scaled(cases, rule) for symbol, rule in VELOCITY_TERMS.items()}
-    fitted = fit(_scaled(cases, lambda c: c.end_v), columns, 2)
+    fitted = _sum_of(cases, lambda c: c.end_v, OF_VELOCITIES)
     if fitted is None:
         return
     if is_sum(fitted, {"(x' - x)/h": 1.0}):
         evidence.right.append(sentence("v' = (x' - x)/h ({count} cases)", count=len(cases)))
-        return
-    gaps = _scaled(cases, lambda c: c.end_v - (c.end - c.x) / c.h)
-    ends = np.cumsum([3 * len(case.free) for case in cases])[:-1]
-    different = sum(np.abs(part).max() > DIFFERENT for part in np.split(gaps, ends))
-    if different >= MIN_CASES:
+    elif sum(map(_has_other_velocities, cases)) >= MIN_CASES:
         evidence.statements.append(_of_fit(sentence(
             "Velocities are {formula} in all {count} cases; of an implicit step they are "
             "(x' - x)/h.", formula=formula(fitted), count=len(cases))))  # fmt: skip
+
+
+def _has_other_velocities(case: SpringCase) -> bool:
+    """Return whether velocities differ from the displacement over the time step."""
+    gaps = np.abs(case.end_v - (case.end - case.x) / case.h)[case.free]
+    return bool(gaps.max() > DIFFERENT * np.abs(case.end_v).max())
