@@ -183,6 +183,8 @@ def inverse_evidence(
             pose.add()
         if pose.answer.finite and reads_sweeps:
             pose.add_sweeps()
+    if any(tables[name].is_wrong_everywhere for name in ("turn", "point")):
+        del tables["pose"]  # which is then wrong as well
     return Evidence(tables, equalities.strongest(), [])
 
 

@@ -104,7 +104,9 @@ def _add_motion(
             whole.add(case.name, gaps[counted].max(), case.features(), tolerance)
     right = [e for e in whole.elements if e.features["springs"] and not e.is_wrong]
     if is_force or len(right) >= MIN_CASES:  # else the step is read in another way than it is made
-        evidence.tables.update(particles=particles, whole=whole)
+        evidence.tables["particles"] = particles
+        if particles.wrong_count:  # else all cases are right too
+            evidence.tables["whole"] = whole
 
 
 def _right_share(residuals: Mapping[str, FloatArray]) -> int:
