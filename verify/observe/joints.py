@@ -19,7 +19,7 @@ from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve
 from ..kinematics.textbook import SOLVERS
 from .equalities import Equalities
-from .separation import TOLERANCE, ElementTable, Evidence
+from .separation import TOLERANCE, ElementTable, Findings
 
 # Rotations by less count as none [rad]: the sine of half the angle is then about rounding.
 UNROTATED = 1e-7
@@ -85,7 +85,7 @@ def _size(offsets: FloatArray) -> float:
 # Forward kinematics
 
 
-def forward_evidence(judgements: Sequence[CaseJudgement]) -> Evidence:
+def forward_evidence(judgements: Sequence[CaseJudgement]) -> Findings:
     """Return what answers of forward kinematics show.
 
     A joint without rotation, and a link without length, count for neither side: they are right
@@ -96,7 +96,7 @@ def forward_evidence(judgements: Sequence[CaseJudgement]) -> Evidence:
     equalities = Equalities(sound)
     for judgement in judgements:
         _add_forward(ForwardPose(judgement), tables, equalities)
-    return Evidence(tables, equalities.strongest(), [])
+    return Findings(tables, equalities.strongest(), [])
 
 
 class ForwardPose:
@@ -109,8 +109,8 @@ class ForwardPose:
         self.parents = np.asarray(self.inputs["parents"])
         self.offsets, self.local = self.inputs["offsets"], self.inputs["local_rotations"]
         self.positions, self.raw = outputs.get("positions"), outputs.get("rotations")
-        answered = _unit(self.right if self.raw is None else self.raw)
-        rotations = np.where(np.isfinite(answered), answered, self.right)
+        unit = _unit(self.right if self.raw is None else self.raw)
+        rotations = np.where(np.isfinite(unit), unit, self.right)
         self.above = _of_parents(rotations, self.parents, IDENTITY)
 
 
@@ -167,7 +167,7 @@ def _add_frames(pose: ForwardPose, links: FloatArray, equalities: Equalities) ->
 
 def inverse_evidence(
     report: TaskReport, judgements: Sequence[CaseJudgement], unread: Set[str] = frozenset()
-) -> Evidence:
+) -> Findings:
     """Return what poses of inverse kinematics show; right sweeps are those of the method.
 
     If `max_iterations` is unread, no answer is that of one sweep.
@@ -185,7 +185,7 @@ def inverse_evidence(
             pose.add_sweeps()
     if any(tables[name].is_wrong_everywhere for name in ("turn", "point")):
         del tables["pose"]  # which is then wrong as well
-    return Evidence(tables, equalities.strongest(), [])
+    return Findings(tables, equalities.strongest(), [])
 
 
 def _method(report: TaskReport) -> str:
@@ -276,14 +276,14 @@ class SolvedPose:
             return
         right = self.right[0]
         effector = int(self.inputs["effector"])
-        start, answered, due = map(self._global, (self.start, local, right))
-        kept = changes, angles(right, self.start)
-        carried = angles(answered, start), angles(due, start)
+        start, globals_, due = map(self._global, (self.start, local, right))
+        of_request = changes, angles(right, self.start)
+        of_global = angles(globals_, start), angles(due, start)
         for key, joints, (gaps, right_gaps) in (
-            ("root_kept", path[0], kept),
-            ("effector_parent_kept", self.parents[effector], kept),
-            ("inner_kept", path[1:-1], kept),
-            ("effector_global_kept", effector, carried),
+            ("root_kept", path[0], of_request),
+            ("effector_parent_kept", self.parents[effector], of_request),
+            ("inner_kept", path[1:-1], of_request),
+            ("effector_global_kept", effector, of_global),
             ("global_answered", path, (angles(local, due), angles(right, due))),
         ):
             self.equalities.add(key, self.name, gaps[joints], right_gaps[joints])

@@ -19,7 +19,7 @@ from ..mass_spring import forces
 from ..mass_spring.cases import telling_cases as spring_cases
 from . import inputs
 from .joints import forward_evidence, inverse_evidence, sound_cases
-from .separation import ElementTable, Evidence, Statement, joined, separation
+from .separation import ElementTable, Findings, Statement, joined, separation
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
@@ -125,7 +125,7 @@ def _score(statement: Statement) -> float:
 
 def _evidence(
     report: TaskReport, judgements: Sequence[CaseJudgement], epsilon: float, unread: Sequence[str]
-) -> Evidence:
+) -> Findings:
     """Return what the answers to a task show; `epsilon` is their precision."""
     if report.task == forward_kinematics.TASK:
         return forward_evidence(judgements)

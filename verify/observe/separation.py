@@ -118,7 +118,7 @@ class ElementTable:
         return sentence("{quantity} ({count})", quantity=self.quantity, count=len(self.elements))
 
 
-class Evidence(NamedTuple):
+class Findings(NamedTuple):
     """Tables by quantity, statements by equations, and what equations show to be right."""
 
     tables: dict[str, ElementTable]

@@ -27,7 +27,7 @@ from .pulls import (
     readings_of,
     solve_pulls,
 )
-from .separation import MIN_CASES, TOLERANCE, ElementTable, Evidence, Statement, words_of
+from .separation import MIN_CASES, TOLERANCE, ElementTable, Findings, Statement, words_of
 
 # An equation needs so many springs more than it has terms to have three terms.
 SPRINGS_FOR_THREE = 25
@@ -39,11 +39,11 @@ KINDS = ("damped_spring", "compressed_spring")
 
 def spring_evidence(
     judgements: Sequence[CaseJudgement], epsilon: float, sound: Set[str] = frozenset()
-) -> Evidence:
+) -> Findings:
     """Return what answers show; `sound` are the names of the cases with a right verdict."""
     cases = [SpringCase(judgement, epsilon) for judgement in judgements]
     cases = [case for case in cases if _is_finite(case)]
-    evidence = Evidence({}, [], [])
+    evidence = Findings({}, [], [])
     solved: dict[str, list[Pulls]] = defaultdict(list)
     residuals: dict[tuple[str, str], dict[str, FloatArray]] = defaultdict(dict)
     for case in cases:
@@ -83,7 +83,7 @@ def _add_motion(
     cases: Sequence[SpringCase],
     residuals: Mapping[tuple[str, str], Mapping[str, FloatArray]],
     sound: Set[str],
-    evidence: Evidence,
+    evidence: Findings,
 ) -> None:
     """Add the right equation of motion, read in the way in which most particles keep it."""
     best = max(residuals, key=lambda key: _right_share(residuals[key]))
@@ -131,7 +131,7 @@ def _residuals(case: SpringCase, reading: ForceReading) -> Iterator[tuple[str, F
 # What springs pull
 
 
-def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Evidence) -> None:
+def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
     pulls = np.concatenate([part.pulls for part in solved])
     symbols = [symbol for symbol in PULLS if symbol not in OF_STEPS or name != "forces"]
     terms = {symbol: np.concatenate([p.terms[symbol] for p in solved]) for symbol in symbols}
@@ -175,7 +175,7 @@ def _add_kinds(
     pulls: FloatArray,
     terms: Mapping[str, FloatArray],
     count: Mapping[str, Any],
-    evidence: Evidence,
+    evidence: Findings,
 ) -> None:
     """Add the sums of springs with and without a feature, or that there is no plain sum."""
     cases = np.concatenate([np.full(len(part.pulls), i) for i, part in enumerate(solved)])
@@ -201,14 +201,14 @@ def _add_kinds(
         evidence.statements.append(Statement(5.0, words, is_exact=False))
 
 
-def _add_gravity(solved: Sequence[Pulls], evidence: Evidence) -> None:
+def _add_gravity(solved: Sequence[Pulls], evidence: Findings) -> None:
     pairs = [(part.gravity, part.case.gravity) for part in solved if part.gravity is not None]
     if len(pairs) < MIN_CASES:
         return
-    shown, requested = (np.array(side) for side in zip(*pairs, strict=True))
-    is_same = np.ptp(shown, axis=0).max() < SAME_GRAVITY
-    if is_same and np.ptp(requested, axis=0).max() > OTHER_GRAVITY:
-        numbers = (f"{number:.4g}" for number in np.round(shown.mean(axis=0), 5) + 0.0)
+    values, requests = (np.array(side) for side in zip(*pairs, strict=True))
+    is_same = np.ptp(values, axis=0).max() < SAME_GRAVITY
+    if is_same and np.ptp(requests, axis=0).max() > OTHER_GRAVITY:
+        numbers = (f"{number:.4g}" for number in np.round(values.mean(axis=0), 5) + 0.0)
         evidence.statements.append(_of_fit(sentence(
             "Gravity is ({gravity}) in all {count} cases in which it can be solved from the "
             "answers, whatever the request says.", gravity=", ".join(numbers),
@@ -243,7 +243,7 @@ def _differ(cases: Sequence[SpringCase]) -> bool:
     return len(gs) > 1 and (len(hs) > 1 or all(case.forces is not None for case in cases))
 
 
-def _add_flights(cases: Sequence[SpringCase], evidence: Evidence) -> None:
+def _add_flights(cases: Sequence[SpringCase], evidence: Findings) -> None:
     """Add what moves free particles without springs."""
     if not _differ(cases):
         return
@@ -294,7 +294,7 @@ FLIGHTS: Sequence[tuple[str, Any, Sequence[str], Sequence[Mapping[str, float]]]]
 )  # fmt: skip
 
 
-def _add_velocities(cases: Sequence[SpringCase], evidence: Evidence) -> None:
+def _add_velocities(cases: Sequence[SpringCase], evidence: Findings) -> None:
     """Add of which differences of positions and old velocities the new ones are a sum."""
     cases = [c for c in cases if c.end is not None and c.end_v is not None and len(c.free)]
     cases = [case for case in cases if not case.problem.external.any()]
@@ -313,5 +313,7 @@ def _add_velocities(cases: Sequence[SpringCase], evidence: Evidence) -> None:
 
 def _has_other_velocities(case: SpringCase) -> bool:
     """Return whether velocities differ from the displacement over the time step."""
+    assert case.end is not None
+    assert case.end_v is not None
     gaps = np.abs(case.end_v - (case.end - case.x) / case.h)[case.free]
     return bool(gaps.max() > DIFFERENT * np.abs(case.end_v).max())
