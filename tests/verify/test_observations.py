@@ -13,6 +13,8 @@ from plumbob.reference import rotation
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
+from plumbob.verify.kinematics.predictions import solve
+from plumbob.verify.kinematics.switches import Switches
 from plumbob.verify.laws import finding
 from plumbob.verify.mass_spring.model import Integrator, StepModel, predicted
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
@@ -276,6 +278,22 @@ def test_sums_need_two_time_steps_and_two_gravities(change, is_said):
     judgements = spring_judgements(faster, lambda inputs: change)
     found = springs.spring_evidence(judgements, 2.0**-52).statements
     assert any("Velocities are" in str(statement.sentence) for statement in found) is is_said
+
+
+def test_what_particles_show_is_not_said_of_cases_again():
+    found = springs.spring_evidence(spring_judgements(faster), 2.0**-52)
+    assert found.tables["particles"].is_right
+    assert "whole" not in found.tables
+
+
+def by_arc_sine(**request):
+    local, positions, _ = solve("ccd", request, Switches(angle=4))
+    return {"local_rotations": local, "positions": positions}
+
+
+def test_arc_sine_shows_where_angles_are_obtuse():
+    first, *_ = observed(by_arc_sine, INVERSE, "ccd")
+    assert first.startswith("Wrong at joints to be rotated by more than 90 degrees and nowhere")
 
 
 def test_pins_and_rest_count_for_neither_side():
