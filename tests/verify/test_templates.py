@@ -232,6 +232,37 @@ def test_the_starter_reads_and_writes_vectors_of(library, tmp_path, monkeypatch)
     assert (reply["positions"], reply["rotations"]) == tuple(pose.values())
 
 
+# Members of a class, which programs assign as often as they initialise variables.
+MEMBERS = {
+    "parents": "std::vector<int>",
+    "offsets": "std::vector<std::array<double, 3>>",
+    "target": "std::array<double, 3>",
+    "method": "std::string",
+    "tolerance": "double",
+    "max_iterations": "int",
+    "converged": "bool",
+}
+
+
+def test_fields_initialise_and_are_assigned(tmp_path):
+    compiler = shutil.which("g++")
+    if compiler is None:
+        pytest.skip("no g++ on this machine")
+    members = "".join(f"{kind} {name};\n" for name, kind in MEMBERS.items())
+    initial = "".join(f'{kind} {name} = in["{name}"];\n' for name, kind in MEMBERS.items())
+    assigned = "".join(f'solver.{n} = in["{n}"]; solver.{n} = {n};\n' for n in MEMBERS)
+    (tmp_path / "plumbob.hpp").write_text(template("cpp")["plumbob.hpp"], "utf-8")
+    (tmp_path / "members.cpp").write_text(
+        f'#include "plumbob.hpp"\nstruct Solver {{\n{members}}};\n'
+        "void solve(const plumbob::Request& in, Solver& solver) {\n"
+        f"{initial}{assigned}}}\n",
+        "utf-8",
+    )
+    command = [compiler, "-std=c++17", "-fsyntax-only", "members.cpp"]
+    done = subprocess.run(command, cwd=tmp_path, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 @pytest.mark.parametrize("language", ["cpp", "rust", "javascript", "go", "java", "csharp"])
 def test_starter_reads_the_method(language):
     code = [

@@ -10,6 +10,8 @@
 #include <map>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
+#include <utility>
 #include <vector>
 #ifdef _WIN32
 #include <io.h>
@@ -190,8 +192,10 @@ template <class List> std::string write(const List& list) {
     return out + ']';
 }
 
-template <class T> struct is_braced : std::false_type {};
-template <class T> struct is_braced<std::initializer_list<T>> : std::true_type {};
+template <class T, class = void> struct is_read : std::false_type {};
+template <class T>
+struct is_read<T, std::void_t<decltype(read(std::declval<const Value&>(), std::declval<T&>()))>>
+    : std::true_type {};
 
 class Request {
   public:
@@ -203,11 +207,11 @@ class Request {
 
     bool has(const std::string& name) const { return members.count(name) > 0; }
 
-    // A field becomes what it is given to: double offset = in["offset"]; null is NaN.
+    // A field becomes what it is given to: double h = in["h"], or h = in["h"]; null is NaN.
     struct Field {
         const Value& value;
-        // Not to a list in braces, which vectors are assigned from as well.
-        template <class T, std::enable_if_t<!is_braced<T>::value, int> = 0> operator T() const {
+        // Nothing else that vectors and strings are assigned from: lists in braces, const char*.
+        template <class T, std::enable_if_t<is_read<T>::value, int> = 0> operator T() const {
             T out;
             read(value, out);
             return out;
