@@ -200,8 +200,13 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
 def _evidence(
     contestant: Contestant, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
-    """Return how answers show that a solver does not take an input, None if they do not."""
-    is_tried = report.task in restriction.tasks
+    """Return how answers show that a solver does not take an input.
+
+    Return None if they do not, or if the greeting declares it.
+    """
+    greeting, is_tried = contestant.greeting, report.task in restriction.tasks
+    if restriction.greeting and restricted(greeting, [(restriction, UNRELATED)]) == greeting:
+        return None
     return _DETECTORS[restriction.detection](contestant, report, restriction) if is_tried else None
 
 

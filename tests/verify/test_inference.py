@@ -190,6 +190,13 @@ def test_a_declared_restriction_needs_no_inference(kind):
     assert not judged(task, function, **declared).tasks[0].assumptions
 
 
+def test_a_declared_plane_is_not_told_to_be_declared():
+    doubled = forces(lambda i: flat(i | {"stiffnesses": 2.0 * i["stiffnesses"]}))
+    (report,) = judged(FORCES, doubled, planar=True).tasks
+    assert report.verdict is Verdict.WRONG
+    assert not report.assumptions
+
+
 @pytest.mark.sample(without=["step-<lambda>", "forces-<lambda>1", "forces-<lambda>2"])
 @pytest.mark.parametrize(("task", "function"), [
     (FORCES, forces(lambda i: i | {"masses": np.ones(len(i["masses"]))})),  # no mass at all
