@@ -1,8 +1,8 @@
 """Constants that a solver has in place of inputs, measured from its answers."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -13,6 +13,7 @@ from .gaps import largest_gap
 from .greeting import Fixed
 from .judgement import TaskReport, Verdict
 from .kinematics import problems
+from .kinematics.pose_laws import read_pose
 from .kinematics.predictions import solve
 from .kinematics.rounding import STALL
 from .kinematics.sweeps import PoseTrial
@@ -36,10 +37,19 @@ CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
 LOOSEST, FARTHEST = 0.02, 0.1
 # The most sweeps that are counted, and the orders of joints in them.
 MOST_SWEEPS, ORDERS = 200, (0, 1)
+# A constant distance ends solves at this scale too; other ends become as many times smaller.
+SCALE = 0.25
 # The longest step of a greeting [s].
 LONGEST = 1.0
 # The energies that gravity changes.
 ENERGIES = ("gravitational", "potential", "total")
+
+
+class Constant(NamedTuple):
+    """A number in place of an input, by which answers are judged."""
+
+    value: Any
+    is_own: bool = True  # whether answers show that it is the program's, and no other near it
 
 
 def is_unread(contestant: Contestant, report: TaskReport, name: str) -> bool:
@@ -65,7 +75,7 @@ def _outputs(contestant: Contestant, case: Case, change: Mapping[str, Any]) -> M
     return answer.values if isinstance(answer, Answer) else {}
 
 
-def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
+def tolerance(contestant: Contestant, report: TaskReport) -> Constant | None:
     """Return the least round number above the distances at which solves end [m].
 
     It is 0 if they end as near as they are asked to, None if most end far from their targets, or do
@@ -81,17 +91,39 @@ def tolerance(contestant: Contestant, report: TaskReport) -> float | None:
         if finding.law == "target reached"
     ]
     if all(finding.verdict is Verdict.RIGHT for finding, _ in ends):
-        return 0.0
+        return Constant(0.0)
     reaches = [facts.get("frames", [facts])[0]["reach"] for _, facts in ends]
     pairs = zip([finding.error for finding, _ in ends], reaches, strict=True)
     near = [error for error, reach in pairs if 0.0 < error <= min(LOOSEST * reach, FARTHEST)]
     if len(near) < len(ends) / 2:
         return None
-    power = 10.0 ** np.floor(np.log10(max(near)))
-    return next(float(f"{n * power:.1g}") for n in (1, 2, 5, 10) if n * power >= max(near))
+    smaller = _ends_of_smaller(contestant, report)
+    value = _round_bound(near)
+    return Constant(value, bool(smaller) and _round_bound(smaller) == value)
 
 
-def max_iterations(contestant: Contestant, report: TaskReport) -> int | None:
+def _round_bound(ends: Sequence[float]) -> float:
+    """Return the least round number above distances."""
+    power = 10.0 ** np.floor(np.log10(max(ends)))
+    return next(float(f"{n * power:.1g}") for n in (1, 2, 5, 10) if n * power >= max(ends))
+
+
+def _ends_of_smaller(contestant: Contestant, report: TaskReport) -> list[float]:
+    """Return the distances at which solves of smaller skeletons end [m], () of tracks."""
+    distances = []
+    for case in (judgement.case for judgement in report.judgements):
+        is_solve = "target" in case.inputs and "sweeps" not in case.facts
+        if not is_solve or case.requirement != "must" or "cones" in case.inputs:
+            continue
+        lengths = {name: SCALE * case.inputs[name] for name in ("offsets", "target")}
+        inputs = {**case.inputs, **lengths}
+        outputs = _outputs(contestant, case, lengths)
+        distance = read_pose(outputs, inputs, case.facts).distance
+        distances += [distance] if case.facts["least"] == 0.0 and distance > 0.0 else []
+    return [distance for distance in distances if distance <= FARTHEST]
+
+
+def max_iterations(contestant: Contestant, report: TaskReport) -> Constant | None:
     """Return the number of sweeps that a solver makes, of other solvers the number allowed.
 
     It is None if a solver does not make the sweeps of its method.
@@ -99,7 +131,8 @@ def max_iterations(contestant: Contestant, report: TaskReport) -> int | None:
     count = _sweeps(contestant, report)
     if count is None and report.method.lower() in SOLVERS:
         return None
-    return problems.ALLOWED if count in (None, MOST_SWEEPS) else count
+    is_own = count not in (None, MOST_SWEEPS)
+    return Constant(count if is_own else problems.ALLOWED, is_own)
 
 
 def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
@@ -143,7 +176,7 @@ def _gaps(trial: PoseTrial, method: str, order: int) -> list[float]:
     return gaps
 
 
-def gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
+def gravity(contestant: Contestant, report: TaskReport) -> Constant | None:
     """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
     case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
     if case is None:
@@ -163,10 +196,12 @@ def gravity(contestant: Contestant, report: TaskReport) -> list[float] | None:
     else:
         return None
     g = np.where(np.abs(g) > 1e-6, g, 0.0)
-    return [float(f"{component:.6g}") for component in g] if np.isfinite(g).all() else None
+    if not np.isfinite(g).all():
+        return None
+    return Constant([float(f"{component:.6g}") for component in g])
 
 
-def step_length(contestant: Contestant, report: TaskReport) -> float | None:
+def step_length(contestant: Contestant, report: TaskReport) -> Constant | None:
     """Return by how much a free particle moves for 1 m/s more [s], None if answers do not tell."""
     case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
     if case is None:
@@ -179,11 +214,11 @@ def step_length(contestant: Contestant, report: TaskReport) -> float | None:
         return None
     ends = [answer["positions"].reshape(-1, *x.shape)[0, 0, 0] for answer in answers]
     h = float(ends[1] - ends[0])
-    return float(f"{h:.6g}") if 0.0 < h <= LONGEST else None
+    return Constant(float(f"{h:.6g}")) if 0.0 < h <= LONGEST else None
 
 
 # How the constants in place of inputs are measured.
-MEASURES: Mapping[str, Callable[[Contestant, TaskReport], Any]] = {
+MEASURES: Mapping[str, Callable[[Contestant, TaskReport], Constant | None]] = {
     "tolerance": tolerance, "max_iterations": max_iterations, "gravity": gravity,
     "h": step_length,
 }  # fmt: skip

@@ -34,6 +34,12 @@ TRIALS = 3
 # Answers that differ by less are the same, in any unit.
 SAME = 1e-12
 UNRELATED = sentence("it gives no answer otherwise")
+# What is judged by where answers do not show the number itself.
+WITHOUT_NUMBER: Mapping[str, Sentence] = {
+    "tolerance": sentence("Judged by the distances at which its solves end"),
+    "max_iterations": sentence("Judged by whole solves"),
+}
+NUMBER = sentence("N is a number of your program, which its answers do not show.")
 # Methods of inverse kinematics that a program may know without declaring them.
 METHODS = ("ccd", "fabrik")
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
@@ -50,6 +56,7 @@ class Restriction(NamedTuple):
     detection: str = "replaced"  # what shows it, a key of `_DETECTORS`
     unused: bool = False  # whether answers do not depend on it at all
     tasks: Sequence[str] = tuple(TASKS)  # those that it is inferred of
+    is_assumed: bool = False  # whether its constant is assumed, which answers do not show
 
     @property
     def measured(self) -> bool:
@@ -162,11 +169,15 @@ def _with_constant(
     name = restriction.input
     if not restriction.measured:
         return restriction
-    value = MEASURES[name](contestant, report)
-    if value is None:
+    constant = MEASURES[name](contestant, report)
+    if constant is None:
         return None
-    about = Sentence(restriction.about.template, {"value": value})
-    return restriction._replace(greeting={"fixed": {name: value}}, about=about)
+    about = Sentence(restriction.about.template, {"value": constant.value})
+    return restriction._replace(
+        greeting={"fixed": {name: constant.value}},
+        about=about if constant.is_own else WITHOUT_NUMBER[name],
+        is_assumed=not constant.is_own,
+    )
 
 
 def _fields(evidence: Evidence) -> dict[str, Any]:
@@ -179,13 +190,21 @@ def _fields(evidence: Evidence) -> dict[str, Any]:
     return fields
 
 
+def _declaration(evidence: Evidence) -> str:
+    """Return what declares restrictions, with N for a number that answers do not show."""
+    fields = _fields(evidence)
+    for name in (restriction.input for restriction, _ in evidence if restriction.is_assumed):
+        fields["fixed"] = {**fields["fixed"], name: "N"}
+    return json.dumps(fields)[1:-1].replace('"N"', "N")
+
+
 def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence) -> TaskReport:
     """Return the report on a restricted solver with its assumptions, and the faults elsewhere."""
     notes = [
         sentence("{about}: {why}.", about=restriction.about, why=why)
         for restriction, why in evidence
     ]
-    declaration = json.dumps(_fields(evidence))[1:-1]
+    declaration = _declaration(evidence)
     is_asked = any(restriction.asks for restriction, _ in evidence)
     notes.append(
         sentence("If that is meant, declare it with {declaration}; if not, it is a mistake.",
@@ -193,6 +212,8 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
         if is_asked
         else sentence("Declare it with {declaration}.", declaration=declaration)
     )  # fmt: skip
+    if any(restriction.is_assumed for restriction, _ in evidence):
+        notes.append(NUMBER)
     assumptions = (*best.assumptions, *notes)
     return replace(best, assumptions=assumptions, is_asked=is_asked, original=report)
 

@@ -160,8 +160,9 @@ def explanation(
         fault = by_key("fabrik")["measured between the passes"]  # after one sweep
         return Explanation((fault.key,), fault.sentence, 1.0, 0.0)
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
-    if test is None:
-        return None
+    is_count = test is not None and test.template == TESTS[0][2].template
+    if test is None or (is_count and greeting.fixed.max_iterations is not None):
+        return None  # a solver with its own number of sweeps ends by no test
     entry = TABLE["stop"][KEY]
     words = sentence(
         "{fault} {count} of {total} solves end as soon as {test}, and none goes on after that.",
