@@ -133,7 +133,7 @@ TIMES = {
     "2e-6 if number < 5 else 1e-6": "10 times faster",
     "4e-6 if number % 4 == 0 else 0": "10 times faster",
     "None": "Not timed: only the round trips of requests are known",
-    "None if number == 3 else 1e-6": "Not timed: only the round trips of requests are known",
+    "None if number % 2 else 1e-6": "Not timed: only the round trips of requests are known",
     "100": "as 0, or a number from 1e-9 to the time that the answer took, got 100.",
     "-1e-6": "got -1e-06.",
     "0": 'Not timed: "seconds" is 0 in all answers.',

@@ -95,6 +95,7 @@ def test_constant_iterations_and_tolerance_are_found_and_said(name):
     assert ("N is a number of your program" in words(report)) is (count == "N")
 
 
+@pytest.mark.slow
 def test_a_distance_at_which_sweeps_happen_to_end_is_no_tolerance():
     def sweep_often(local_rotations, **inputs):
         inputs |= {"local_rotations": local_rotations, "tolerance": 0.0, "max_iterations": 15}

@@ -171,7 +171,7 @@ EQUAL = {
 
 
 @pytest.mark.sweep(
-    "code", codes_with_programs, without=["STEP", "STOP", "CCD", "JACOBIAN"], every=200
+    "code", codes_with_programs, without=["STEP", "STOP", "CCD", "JACOBIAN", "CLAIM"], every=170
 )
 def test_a_wrong_program_is_named_by_its_code(code):
     fault = coded_faults()[code]

@@ -49,7 +49,7 @@ def test_long_chains_need_a_fraction_of_the_sweeps(distance, share, rng):
     assert (accelerated.iterations < share * plain.iterations).all()
 
 
-@pytest.mark.sample("chain", "python")
+@pytest.mark.sample("chain")
 @pytest.mark.parametrize("backend", ["numba", "python"])
 @pytest.mark.parametrize("model", ["chain", "balls", "hinges"])
 def test_no_sweep_raises_the_error(model, backend, rng):
