@@ -38,7 +38,9 @@ def by_name():
     return {f"{one.family}, {one.name}, {one.task}": one for one in (*subjects(), *engines())}
 
 
-@pytest.mark.sweep("name", by_name, without=["robot", "steps, ", "CCD", "FABRIK", "limits"], every=200)
+@pytest.mark.sweep(
+    "name", by_name, without=["robot", "steps, ", "CCD", "FABRIK", "limits"], every=200
+)
 def test_fault_is_caught_and_named_and_honest_solver_is_right(name):
     trial = attempt(by_name()[name])
     assert trial.verdict is trial.first_verdict  # the search for the cause has not changed it

@@ -72,6 +72,11 @@ def finger():
     return Articulation(links, kinds, axes, mimics={1: Mimic(0, 3.0), 2: Mimic(0, -50.0, 0.2)})
 
 
+def spinner():
+    """A hinge about its effector."""
+    return Articulation(Skeleton([-1], np.zeros((1, 3))), "hinge", [0.6, 0.0, 0.8])
+
+
 def target_at(model, q, effector=-1):
     """The pose of an effector as a target."""
     pose = forward_kinematics(model, q)
@@ -154,8 +159,22 @@ class TestRounding:
                 worst = max(worst, error / bounds.position, error_rotation / bounds.rotation)
         assert worst > 1e-3  # the bound is not too large to say anything
 
+    def test_of_an_arm_it_is_nine_orders_below_a_tolerance(self):
+        model = seven()
+        q = model.random(np.random.default_rng(0))
+        result = certify_ik(model, q, target_at(model, q))
+        assert 0 < result.rounding < 2e-13
+        assert result.rounding <= result.residual < 2 * result.rounding
+        quaternion = 7 * 48 * 2.0**-53  # of seven joints
+        assert 2 * quaternion <= result.residual_rotation < 2.2 * quaternion
+
 
 class TestLipschitz:
+    def test_a_rotation_by_half_a_turn_has_the_second_derivative_one_half(self):
+        """Twice the sine of half an angle: minus half of that sine."""
+        system = equations(spinner(), np.zeros(1), error=1.0)
+        assert system.lipschitz(np.ones(1, dtype=bool)) == pytest.approx(0.5)
+
     @pytest.mark.parametrize(
         "kinds", [HINGES, MIXED, ["ball"] * 4, crane, wrist, finger],
         ids=["hinges", "mixed", "balls", "crane", "wrist", "finger"],
