@@ -1,4 +1,4 @@
-"""Solvers of kinematics for the tests: the textbook with chosen faults, and the reference."""
+"""Solvers of kinematics for the tests: the textbook, programs with faults, and the reference."""
 
 from dataclasses import replace
 
@@ -7,11 +7,11 @@ import conformance_students as students
 from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
 from plumbob.verify.case import Case
 from plumbob.verify.cause_search import CauseSearch, JudgedAnswers
+from plumbob.verify.fault_programs import coded_faults, source_of
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics.faults import switches
-from plumbob.verify.kinematics.predictions import predict_forward, predict_track, solve
+from plumbob.verify.kinematics.predictions import TEXTBOOK, forward, predict_track, solve
 from plumbob.verify.laws import HOLDS
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 
@@ -64,25 +64,31 @@ def case_of(task, inputs, **facts):
     return Case("", task, inputs, "", HOLDS, facts=facts)
 
 
-def textbook(task, faults=(), method="ccd", outputs=None):
-    """Return the textbook's solver with some faults, by default with all outputs of its task."""
-    switched = switches(faults)
+def textbook(task, method="ccd", choices=TEXTBOOK):
+    """Return the textbook's solver with the choices of an honest program."""
 
     def function(**inputs):
-        if task == INVERSE:
-            local, positions, _ = solve(method, inputs, switched)
-            answer = {"local_rotations": local, "positions": positions}
-        elif task == TRACK:
-            answer = predict_track(method, switched, case_of(task, inputs))
+        if task == FORWARD:
+            return forward(inputs)
+        if task == TRACK:
+            answer = predict_track(method, case_of(task, inputs))
             answer = {"positions": answer["all_positions"], **answer}
-            answer = {
-                name: answer[name] for name in {"positions", "local_rotations"} & answer.keys()
-            }
-        else:
-            answer = predict_forward(switched, case_of(task, inputs))
-        return {name: answer[name] for name in outputs or answer}
+            names = {"positions", "local_rotations"} & answer.keys()
+            return {name: answer[name] for name in names}
+        local, positions, _ = solve(method, inputs, choices)
+        return {"local_rotations": local, "positions": positions}
 
     return function
+
+
+def faulty(task, *codes, method="ccd"):
+    """Return the function of a right program with known faults in its lines."""
+    source = source_of({FORWARD: "forward kinematics", TRACK: "track"}.get(task, method))
+    for code in codes:
+        source = coded_faults()[code].planted_in(source)
+    names = {}
+    exec(compile(source, "program", "exec"), names)
+    return names[method if task == INVERSE else task]
 
 
 def reference(task, solver=""):

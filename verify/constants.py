@@ -17,8 +17,7 @@ from .kinematics.pose_laws import read_pose
 from .kinematics.predictions import solve
 from .kinematics.rounding import STALL
 from .kinematics.sweeps import PoseTrial
-from .kinematics.switches import Switches
-from .kinematics.textbook import SOLVERS
+from .kinematics.textbook import SOLVERS, Choices
 
 # The requests in which an input is changed; all answers must stay the same.
 TRIALS = 3
@@ -36,7 +35,7 @@ CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
 # A distance that ends solves is no larger than this share of the reach, and than this [m].
 LOOSEST, FARTHEST = 0.02, 0.1
 # The most sweeps that are counted, and the orders of joints in them.
-MOST_SWEEPS, ORDERS = 200, (0, 1)
+MOST_SWEEPS = 200
 # A constant distance ends solves at this scale too; other ends become as many times smaller.
 SCALE = 0.25
 # The longest step of a greeting [s].
@@ -148,9 +147,9 @@ def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
         return None
     methods = [m for m in SOLVERS if m == report.method.lower()] or SOLVERS
     gaps = [
-        np.max([_gaps(trial, method, order) for trial in trials], axis=0)
+        np.max([_gaps(trial, method, root_first) for trial in trials], axis=0)
         for method in methods
-        for order in ORDERS
+        for root_first in (False, True)
     ]
     best = min(gaps, key=np.min)
     return int(np.argmin(best)) + 1 if best.min() <= STALL["single"] else None
@@ -167,11 +166,11 @@ def _exchange(contestant: Contestant, report: TaskReport, case: Case) -> Exchang
     return Exchange(case, answer, answer)
 
 
-def _gaps(trial: PoseTrial, method: str, order: int) -> list[float]:
+def _gaps(trial: PoseTrial, method: str, root_first: bool) -> list[float]:
     """Return how far a pose is from that after each of a textbook's sweeps, over the reach."""
     inputs, gaps = {**trial.case.inputs, "tolerance": 0.0, "max_iterations": 1}, []
     for _ in range(MOST_SWEEPS):
-        inputs["local_rotations"], x, _ = solve(method, inputs, Switches(order=order))
+        inputs["local_rotations"], x, _ = solve(method, inputs, Choices(root_first=root_first))
         gaps.append(trial.pose.distance_to(x) / trial.case.facts["reach"])
     return gaps
 

@@ -9,7 +9,6 @@ from .contestant import Exchange
 from .greeting import Greeting
 from .judgement import Diagnosis, TaskReport
 from .kinematics import (
-    forward_diagnosis,
     forward_kinematics,
     inverse_diagnosis,
     inverse_kinematics,
@@ -26,6 +25,7 @@ from .kinematics import (
     track,
     track_diagnosis,
 )
+from .kinematics.report import with_hints
 from .mass_spring import energy, energy_diagnosis, force_diagnosis, forces, step_diagnosis
 from .mass_spring.stepping import Stepping
 
@@ -42,9 +42,15 @@ class Discipline(NamedTuple):
     diagnose: Callable[[JudgedAnswers], Diagnosis]
 
 
-# The laws of each task, and what explains wrong answers.
+def _of_laws(judged_answers: JudgedAnswers) -> Diagnosis:
+    """Return the diagnosis of answers of which nothing is known but broken laws."""
+    report = judged_answers.report
+    return with_hints(report.judgements, Diagnosis(behaviour=report.diagnosis.behaviour))
+
+
+# The laws of each task, and what explains wrong answers before changed lines do, if anything.
 _PAIRS: Sequence[tuple[Any, Any]] = (
-    (forward_kinematics, forward_diagnosis),
+    (forward_kinematics, None),
     (inverse_kinematics, inverse_diagnosis),
     (track, track_diagnosis),
     (resample, resample_diagnosis),
@@ -58,5 +64,6 @@ _PAIRS: Sequence[tuple[Any, Any]] = (
     (robot_track, robot_track_diagnosis),
 )
 DISCIPLINES: dict[str, Discipline] = {
-    laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose) for laws, causes in _PAIRS
+    laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose if causes else _of_laws)
+    for laws, causes in _PAIRS
 }

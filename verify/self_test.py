@@ -6,6 +6,7 @@ sent, or if it is named beside a reservation; a mere reservation (RIGHT EXCEPT) 
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import Any, Literal, NamedTuple
 
@@ -15,23 +16,22 @@ from plumbob.reference import Skeleton, forward_kinematics, solve_ik
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.skeleton import Pose
-from plumbob.text.sentence import sentence
+from plumbob.text.sentence import codes_in, sentence
 
 from .case import Case
-from .fault_programs import coded_faults, contestant_of
+from .fault_programs import PROGRAMS, CodedFault, coded_faults, contestant_of, source_of
 from .functions import FunctionContestant
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Report, Verdict
-from .kinematics.faults import FAULTS, switches
+from .kinematics.honest import HONEST as HONEST_SWEEPS
 from .kinematics.limits import solve_within
-from .kinematics.predictions import predict_forward, predict_track, solve
+from .kinematics.predictions import predict_track
 from .kinematics.robot_inverse_kinematics import TASK as ROBOTS
 from .kinematics.robot_inverse_kinematics import solve_by_reference
 from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
 from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
 from .kinematics.robot_velocity import TASK as ROBOT_VELOCITY
-from .kinematics.switches import Switches
 from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from .mass_spring.force_diagnosis import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
@@ -50,7 +50,8 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
 FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
 MOTION = "mass_spring_motion"
-FAMILIES = {"forward": "forward kinematics", "ccd": "CCD", "fabrik": "FABRIK"}
+# The headings of the families of faults of kinematics.
+FAMILIES = {"FK": "forward kinematics", "QUAT": "quaternions", "CCD": "CCD", "FABRIK": "FABRIK"}
 ALL_SYSTEMS = System(external_forces=True, tension_only=True)
 
 
@@ -103,22 +104,13 @@ def attempt(subject: Subject) -> Trial:
         laws |= {"takes what is sent"}
     explanations = report.diagnosis.explanations
     keys = explanations[0].faults if explanations else ()
-    covered = {
-        key for faults in FAULTS.values() for f in faults if f.key in keys for key in f.covers
-    }
-    known = {*keys, *covered, *(NUMBER.sub("", key) for key in keys)}
+    known = {*keys, *(NUMBER.sub("", key) for key in keys)}
     is_named = subject.fault in known if subject.fault else not keys
     return Trial(subject, report.verdict, laws, is_named, published[-1].verdict)
 
 
 # The number of one of several rules of a robot's fault, at the end of its key.
 NUMBER = re.compile(r" \d+$")
-# Faults that show only in programs of another form, which the lines of their code make.
-ELSEWHERE = {
-    "positions before the last rotation", "positions before the last sweep",
-    "positions of the start", "product of quaternions reversed", "link rotated by the parent",
-    "parent by index",
-}  # fmt: skip
 
 
 def subjects() -> Iterator[Subject]:
@@ -138,15 +130,22 @@ def _subjects(
 
 
 def _kinematic_faults() -> Iterator[Subject]:
-    for part, family in FAMILIES.items():
-        task, method = (FK, "") if part == "forward" else (IK, part)
-        faults = {
-            fault.key: switches([fault])._replace(rotating=fault.part == "quaternion")
-            for fault in FAULTS[part]
-            if not fault.honest and fault.key not in ELSEWHERE
-        }
-        functions = {key: partial(_textbook, method, setting) for key, setting in faults.items()}
-        yield from _subjects(family, task, functions, methods=(method,))
+    honest = {code for choices in HONEST_SWEEPS.values() for choice in choices
+              for code in codes_in(choice.sentence)}  # fmt: skip
+    for fault in coded_faults().values():
+        if fault.family in FAMILIES and fault.code not in honest:
+            method = "" if fault.task == FK else "fabrik" if fault.family == "FABRIK" else "ccd"
+            function = {fault.name: _function(method or FK, _in_another_form(fault))}
+            yield from _subjects(FAMILIES[fault.family], fault.task, function, methods=(method,))
+
+
+def _in_another_form(fault: CodedFault) -> str:
+    """Return a program with a fault, not the fault's own one if another has its lines."""
+    for name, entry in PROGRAMS.items():
+        if entry["task"] == fault.task and name != fault.program:
+            with suppress(ValueError):
+                return fault.planted_in(source_of(name))
+    return fault.wrong_program
 
 
 def _limits() -> Iterator[Subject]:
@@ -189,15 +188,8 @@ def _followed(**inputs: Any) -> Mapping[str, Any]:
     return {"q": followed(inputs, inputs["start"], tool)}
 
 
-def _textbook(method: str, switched: Switches, /, **inputs: Any) -> Mapping[str, Any]:
-    if not method:
-        return predict_forward(switched, Case("", "", inputs, "", sentence("")))
-    local, positions, _ = solve(method, inputs, switched)
-    return {"local_rotations": local, "positions": positions}
-
-
 def _track(method: str, /, **inputs: Any) -> Mapping[str, Any]:
-    outputs = predict_track(method, switches([]), Case("", "", inputs, "", sentence("")))
+    outputs = predict_track(method, Case("", "", inputs, "", sentence("")))
     answer = {"positions": outputs["all_positions"]}
     return answer | {name: outputs[name] for name in outputs if name == "local_rotations"}
 

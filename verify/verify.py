@@ -16,9 +16,8 @@ from .disciplines import DISCIPLINES
 from .examination import Examiner
 from .greeting import Greeting
 from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
-from .kinematics import faults, inverse_kinematics, robot_inverse_kinematics, robot_jacobian
+from .kinematics import inverse_kinematics, robot_inverse_kinematics, robot_jacobian
 from .kinematics.claims import OF_WRONG_POSES
-from .kinematics.faults import SwitchFault
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
 from .observe import observations
@@ -203,7 +202,7 @@ class Attempt:
     def _diagnosis(
         self,
         search: CauseSearch,
-        base: Sequence[SwitchFault | str] | None,
+        base: Sequence[str] | None,
         report: TaskReport,
     ) -> Diagnosis:
         """Return why answers are wrong, in the precision that they are judged by or in single."""
@@ -273,18 +272,18 @@ def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> Ta
 
 def _known_faults(
     task: str, reports: Sequence[TaskReport], causes: Sequence[TaskReport]
-) -> Sequence[SwitchFault | str] | None:
-    """Return the faults of a task's foundations, None if right or unexplained.
+) -> Sequence[str] | None:
+    """Return the keys of the faults of a task's foundations, none if unexplained, None if right.
 
-    For robots the faults are keys, none if the Jacobian is wrong for an unknown reason. Poses that
-    miss for a known reason miss in motions too.
+    Poses of robots that miss for a known reason miss in motions too.
     """
-    if not task.startswith("robot"):
-        return next(filter(None, map(faults.explaining, causes)), None)
-    if task == robot_jacobian.TASK:
-        return None
-    wrong = [r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG]
-    wrong += [cause for cause in causes if cause.task == robot_inverse_kinematics.TASK]
+    wrong = list(causes)
+    if task.startswith("robot"):
+        poses = robot_inverse_kinematics.TASK
+        wrong = [cause for cause in causes if cause.task == poses]
+        wrong += [
+            r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG
+        ]
     explanations = [
         explanation for report in wrong for explanation in report.diagnosis.explanations[:1]
     ]

@@ -10,14 +10,6 @@ import plumbob.verify.verify  # noqa: F401
 from plumbob.verify.cause_search import NoSearch
 
 
-@pytest.fixture(autouse=True)
-def without_changed_lines(request, monkeypatch):
-    """Leave the search of changed lines, seconds for each unknown mistake, to the tests of it."""
-    if not request.module.__name__.endswith("test_one_line"):
-        module = sys.modules["plumbob.verify.verify"]
-        monkeypatch.setattr(module, "with_changed_line", lambda report, *arguments: report)
-
-
 @pytest.fixture
 def verdict_alone(monkeypatch):
     """Seek no cause of wrong answers: the verdict does not depend on it."""

@@ -17,6 +17,7 @@ from kinematics_solvers import (
     TRACK,
     broken,
     case_of,
+    faulty,
     judged,
     judged_some,
     named,
@@ -26,77 +27,63 @@ from kinematics_solvers import (
 )
 
 from plumbob.reference import IK_SOLVERS, resample, rotation
+from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import sweeps
-from plumbob.verify.kinematics.faults import FAULTS, by_key
+from plumbob.verify.kinematics import honest, problems, sweeps
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import forward, solve
 from plumbob.verify.kinematics.resample_faults import FAULTS as RESAMPLE_FAULTS
+from plumbob.verify.kinematics.textbook import Choices
 from plumbob.verify.verify import DISCIPLINES
 
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
-HONEST_FAULTS = [(m, fault) for m in METHODS for fault in FAULTS[m] if fault.honest]
-
-
-def faulty(method, key):
-    """Return the report on a textbook's method with a fault."""
-    return judged(INVERSE, textbook(INVERSE, [by_key(method)[key]], method), method)
+HONEST_CHOICES = [(m, choice) for m in METHODS for choice in honest.HONEST[m]]
 
 
 # ---- faults
 
 
-@pytest.mark.sample("fault8")
-@pytest.mark.parametrize(("method", "fault"), HONEST_FAULTS)
-def test_honest_fault_is_named_and_right(method, fault):
-    report = faulty(method, fault.key)
+@pytest.mark.parametrize(("method", "choice"), HONEST_CHOICES)
+def test_honest_choice_is_told_and_right(method, choice):
+    report = judged(INVERSE, textbook(INVERSE, method, choice.choices), method)
     assert report.verdict is RIGHT_EXCEPT
     assert broken(report, RIGHT_EXCEPT) - {"target reached"}
-    assert named(report) == [{fault.key}]
-
-
-@pytest.mark.sample("frames start anew-ccd")
-@pytest.mark.parametrize(
-    ("method", "fault"),
-    [
-        pytest.param(method, fault, id=f"{fault.key}-{method}")
-        for method in METHODS
-        for fault in FAULTS["track ccd"]
-        # points alone do not show what becomes of rotations
-        if fault.part == "follow"
-        and (method, fault.switch, fault.number) != ("fabrik", "frame_saved", 2)
-        and (method == "ccd" or not fault.key.startswith(("global", "iterations", "positions of")))
-    ],
-)
-def test_fault_of_tracking_is_caught_and_named(method, fault):
-    report = judged(TRACK, textbook(TRACK, [fault], method), method)
-    is_harmless = fault.honest or (method == "fabrik" and fault.key == "frames start at rest")
-    assert report.verdict is (RIGHT_EXCEPT if is_harmless else WRONG)
-    assert fault.key in named(report)[0]
+    assert any(str(choice.sentence) in words for words in told(report))
+    assert not report.diagnosis.explanations
 
 
 @pytest.mark.parametrize(
-    ("key", "law"),
-    [
-        ("target from the origin", "equal worlds"),
-        ("world rotation on the right", "distance does not grow"),
-    ],
+    ("code", "law"), [("PB-CCD-021", "equal worlds"), ("PB-CCD-002", "distance does not grow")]
 )
 @pytest.mark.usefixtures("verdict_alone")
-def test_fault_breaks_a_law_of_its_own(key, law):
-    assert law in broken(faulty("ccd", key))
+def test_fault_breaks_a_law_of_its_own(code, law):
+    assert law in broken(judged(INVERSE, faulty(INVERSE, code), "ccd"))
 
 
 @pytest.mark.usefixtures("verdict_alone")
 def test_one_iteration_too_many_that_is_reported_is_wrong():
-    solve = textbook(INVERSE, [by_key("ccd")["one sweep more"]])
+    solve = textbook(INVERSE, "ccd", Choices(more_sweeps=1))
 
     def ccd(max_iterations, **inputs):
         answer = solve(max_iterations=max_iterations, **inputs)
         return {**answer, "iterations": max_iterations + 1}
 
     assert "claims" in broken(judged_some(INVERSE, ccd, "ccd"))
+
+
+@pytest.mark.parametrize("is_told", [True, False])
+def test_right_points_beside_unknown_rotations_are_told(is_told):
+    """The rotations have a mistake that no catalogue knows; the points are right, or are not."""
+    greeting, trials = Greeting(1, (INVERSE,)), []
+    for case in problems.cases(greeting, "fabrik", 1, False)[:3]:
+        local, positions, _ = solve("fabrik", case.inputs)
+        local = rotation.multiply(local, rotation.exponential([0.3, 0.2, 0.1]))
+        positions = positions + (0.0 if is_told else 0.01)
+        answer = Answer({"local_rotations": local, "positions": positions}, 0.0)
+        trials.append(sweeps.PoseTrial(Exchange(case, answer, answer)))
+    comparison = sweeps.SweepComparison("fabrik", wrong=[trials[0].case.name])
+    assert (sweeps.right_points(comparison, trials, greeting) is not None) == is_told
 
 
 # ---- honest solvers
@@ -168,7 +155,7 @@ def test_solver_that_continues_to_the_target_has_a_reservation():
 @pytest.mark.parametrize("seed", [1, 2, 3])
 @pytest.mark.parametrize("method", METHODS)
 def test_right_solvers_are_right_with_any_seed(seed, method):
-    assert judged(INVERSE, textbook(INVERSE, (), method), method, seed).verdict <= RIGHT_EXCEPT
+    assert judged(INVERSE, textbook(INVERSE, method), method, seed).verdict <= RIGHT_EXCEPT
 
 
 # ---- lies
@@ -246,7 +233,6 @@ def test_law_of_forward_kinematics_catches_a_lie(name):
     if name == "unknown fault":
         assert not diagnosis.explanations
         assert "Joint 1 is" in str(diagnosis.first_broken)
-        assert diagnosis.variant_count > 150
 
 
 @pytest.mark.usefixtures("verdict_alone")

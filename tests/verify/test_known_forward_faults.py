@@ -1,7 +1,7 @@
-"""Known faults of forward kinematics are applied where a solver's CCD and FABRIK are judged."""
+"""Tasks that build upon a wrong one point to it."""
 
 import pytest
-from kinematics_solvers import FORWARD, INVERSE, METHODS, named, textbook
+from kinematics_solvers import FORWARD, INVERSE, METHODS, faulty
 
 from plumbob.text.sentence import Sentence, sentence
 from plumbob.verify.case import Case
@@ -14,43 +14,19 @@ from plumbob.verify.judgement import (
     Explanation,
     TaskReport,
 )
-from plumbob.verify.kinematics.faults import by_key
 from plumbob.verify.laws import finding
 from plumbob.verify.verify import _with_cause, verify
 
-# Faults of forward kinematics: one, two, and one that is never tried together with others.
-BASES = [
-    ["offset not rotated"],
-    ["product reversed", "root rotation dropped"],
-    ["offset rotated backwards", "positions from the root"],
-    ["Euler angles XYZ as ZYX"],
-]
 
-
-def reports(base, method, declared):
-    """Return the reports on a solver's forward kinematics and on its inverse kinematics."""
-    faults = [by_key(method)[key] for key in base]
-    functions = {
-        FORWARD: textbook(FORWARD, faults),
-        INVERSE: textbook(INVERSE, faults, method),
-    }
-    methods = (method if declared else "",)
-    return verify(
-        FunctionContestant(functions, Greeting(1, (FORWARD, INVERSE), methods=methods))
-    ).tasks
-
-
-@pytest.mark.sample("base0-fabrik-True")
-@pytest.mark.parametrize("declared", [True, False])
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("base", BASES)
-def test_solver_that_only_stands_on_wrong_forward_kinematics_is_said_to(base, method, declared):
-    forward, inverse = reports(base, method, declared)
-    assert set(base) <= set(" + ".join(named(forward)[0]).split(" + "))
-    first = inverse.diagnosis.explanations[0]
-    assert first.share == 1.0
-    assert "Its own steps are right" in str(first.sentence)
-    assert set(base) <= set(first.faults[0].split(" + "))
+def test_a_solver_that_stands_on_wrong_forward_kinematics_is_told_its_mistake(method):
+    code = "PB-FK-003"
+    functions = {FORWARD: faulty(FORWARD, code), INVERSE: faulty(INVERSE, code, method=method)}
+    greeting = Greeting(1, (FORWARD, INVERSE), methods=(method,))
+    forward, inverse = verify(FunctionContestant(functions, greeting)).tasks
+    assert forward.diagnosis.explanations[0].codes == [code]
+    (hint, *_) = inverse.diagnosis.hints
+    assert f"Its forward_kinematics is wrong as well ({code})" in str(hint)
 
 
 @pytest.mark.parametrize("codes", [("PB-FORCE-001",), ()])

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from kinematics_solvers import textbook
+from kinematics_solvers import faulty
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
@@ -18,7 +18,6 @@ from plumbob.verify.judgement import (
     TaskReport,
     Verdict,
 )
-from plumbob.verify.kinematics.faults import FAULTS
 from plumbob.verify.mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
 from plumbob.verify.mass_spring.model import StepModel
 from plumbob.verify.mass_spring.options import apply
@@ -34,12 +33,12 @@ def options_of(faults, key):
     return [fault for fault in faults if fault.key == key][:1]
 
 
-def forward_kinematics(key):
-    return textbook("forward_kinematics", options_of(FAULTS["forward"], key))
+def forward_kinematics(code):
+    return faulty("forward_kinematics", *filter(None, [code]))
 
 
-def ccd(key):
-    return textbook("inverse_kinematics", options_of(FAULTS["ccd"], key))
+def ccd(code):
+    return faulty("inverse_kinematics", *filter(None, [code]))
 
 
 def forces(key):
@@ -56,8 +55,8 @@ def step(key):
 
 # What makes a solver by the key of its fault, a fault, and what the greeting says besides.
 TASKS = {
-    "forward_kinematics": (forward_kinematics, "own rotation on own offset", {}),
-    "inverse_kinematics": (ccd, "world rotation on the left", {"methods": ("ccd",)}),
+    "forward_kinematics": (forward_kinematics, "PB-FK-002", {}),
+    "inverse_kinematics": (ccd, "PB-CCD-001", {"methods": ("ccd",)}),
     "mass_spring_forces": (forces, "gravity g/m", {}),
     "mass_spring_step": (step, "gravity g/m", {"step": DECLARED["linearised"][1]}),
 }

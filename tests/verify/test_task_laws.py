@@ -29,13 +29,11 @@ from plumbob.verify.kinematics import (
     robot_inverse_kinematics,
     robot_models,
     robot_targets,
-    sweep_diagnosis,
     sweeps,
     track,
 )
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import predict_track
-from plumbob.verify.kinematics.switches import Switches
 from plumbob.verify.laws import HOLDS, equal_answers
 from plumbob.verify.mass_spring import energy, forces
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
@@ -196,7 +194,7 @@ def test_the_last_side_of_a_closed_curve_counts():
 def motion():
     """The request for a chain's small circle, and the textbook's answer by FABRIK."""
     case = track.cases(Greeting(1, ("track",)), "fabrik", 0, False)[0]
-    found = predict_track("fabrik", Switches(), case)
+    found = predict_track("fabrik", case)
     return case, np.array(found["path_positions"])
 
 
@@ -219,9 +217,7 @@ def test_a_single_frame_that_breaks_a_law_breaks_it(motion, frame):
 def test_only_frames_that_start_anew_do_not_continue(motion):
     """Those of another solver are neither the textbook's nor the textbook's from the start."""
     case, _ = motion
-    outputs = {
-        start: predict_track("fabrik", Switches(frame_start=start), case) for start in (0, 1)
-    }
+    outputs = {start: predict_track("fabrik", case, start) for start in (False, True)}
     answers = {
         "warm": outputs[0],
         "anew": outputs[1],
@@ -254,14 +250,6 @@ def test_the_method_is_that_of_half_of_the_right_sweeps(hits, method, monkeypatc
     monkeypatch.setattr(sweeps, "_error", lambda trial, name, greeting: errors[name](trial))
     monkeypatch.setattr(sweeps, "is_other_solver", lambda *arguments: True)
     assert sweeps.recognise_method(range(8), GREETING) == method
-
-
-@pytest.mark.parametrize(("share", "method"), [(0.5, "fabrik"), (0.49, "")])
-def test_the_suspected_method_has_a_fault_that_gives_half_of_the_sweeps(share, method, monkeypatch):
-    fits = {"ccd": (0.0, 0), "fabrik": (share, -1)}
-    monkeypatch.setattr(sweep_diagnosis, "is_other_solver", lambda *arguments: False)
-    monkeypatch.setattr(sweep_diagnosis, "_best_fit", lambda trials, name, *others: fits[name])
-    assert sweep_diagnosis.suspected_method(range(8), GREETING) == method
 
 
 @pytest.mark.parametrize(("hits", "is_named"), [(9, True), (8, False)])

@@ -10,20 +10,25 @@ from typing import NamedTuple
 import numpy as np
 
 from plumbob.reference.arguments import FloatArray
-from plumbob.text.sentence import Sentence, sentence, with_code
+from plumbob.text.sentence import Sentence, sentence
 
 from ..explain import ending_test
 from ..greeting import Greeting
 from ..judgement import Explanation
-from .faults import TABLE, by_key, sentences_of
+from .faults import sentences_of
 from .predictions import solve
 from .sweeps import PoseTrial
 
 KEY, SQUARED = "early by another test", "tolerance against the squared distance"
+BETWEEN = "measured between the passes"
+EARLY_ENDS = {KEY, SQUARED, BETWEEN}
 # So many solves end early, at least, if squared distances end them.
 LEAST_EARLY = 3
-# A pose is that after a sweep up to this share of the skeleton's size, by precision.
-SAME_POSE = {"double": 1e-7, "single": 1e-5}
+# A pose is that after a sweep up to this share of the skeleton's size, by precision, or if it is
+# so many times nearer to it than to that after any other: sweeps enlarge rounding.
+SAME_POSE, NEARER = {"double": 1e-7, "single": 1e-5}, 30.0
+# The words of the test whose mistake has a code of its own.
+OF_SQUARES = sentence("the square of the distance to the target is below the tolerance")
 
 
 class FollowedSolve(NamedTuple):
@@ -100,6 +105,7 @@ TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
         1.0,
         sentence("each component of target - effector is below the tolerance, even negative"),
     ),
+    (lambda s: _distances(s) ** 2 / s.tolerance, 1.0, OF_SQUARES),
     (_distances, None, sentence("the distance to the target is below about {bound:.3g} m")),
     (
         lambda s: _distances(s) / s.tolerance,
@@ -156,17 +162,18 @@ def explanation(
     if not ended:
         return None
     early = [solve for solve in ended if solve.is_early]
-    if method == "fabrik" and len(early) > 1 and all(len(solve.gaps) == 2 for solve in early):
-        fault = by_key("fabrik")["measured between the passes"]  # after one sweep
-        return Explanation((fault.key,), fault.sentence, 1.0, 0.0)
+    is_single = len(early) > 1 and all(len(solve.gaps) == 2 for solve in early)
+    if method == "fabrik" and is_single:  # after one sweep
+        return Explanation((BETWEEN,), sentences_of("fabrik")[BETWEEN], 1.0, 0.0)
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
+    if test is not None and test.template == OF_SQUARES.template:
+        return Explanation((SQUARED,), sentences_of("stop")[SQUARED], 1.0, 0.0)
     is_count = test is not None and test.template == TESTS[0][2].template
     if test is None or (is_count and greeting.fixed.max_iterations is not None):
         return None  # a solver with its own number of sweeps ends by no test
-    entry = TABLE["stop"][KEY]
     words = sentence(
         "{fault} {count} of {total} solves end as soon as {test}, and none goes on after that.",
-        fault=with_code(entry["code"], Sentence(entry["sentence"], {})),
+        fault=sentences_of("stop")[KEY],
         count=len(early), total=len(ended), test=test,
     )  # fmt: skip
     return Explanation((KEY,), words, 1.0, 0.0)
@@ -180,11 +187,12 @@ def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve |
         solve(method, {**inputs, "tolerance": 0.0, "max_iterations": count})[1]
         for count in range(needed + 1)
     ]
-    bound = SAME_POSE[greeting.precision] * size
-    counts = [i for i, x in enumerate(poses) if trial.pose.distance_to(x) <= bound]
-    if len(counts) != 1:
+    distances = np.array([trial.pose.distance_to(x) for x in poses])
+    count = int(np.argmin(distances))
+    others = np.delete(distances, count)
+    bound = max(SAME_POSE[greeting.precision] * size, others.min(initial=np.inf) / NEARER)
+    if np.flatnonzero(distances <= bound).tolist() != [count]:
         return None
-    (count,) = counts
     gaps = np.array([x[inputs["effector"]] - inputs["target"] for x in poses[: count + 1]])
     path = trial.pose.path
     lengths = np.linalg.norm(inputs["offsets"][path[1:]], axis=1)

@@ -7,36 +7,34 @@ from typing import NamedTuple
 
 from plumbob.text.sentence import Sentence, sentence, with_code
 
-from .switches import Switches
+from .textbook import Choices
 
 _TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
 
 
 class HonestSweeps(NamedTuple):
-    """A choice that may be on purpose: its answers still obey every law."""
+    """Choices that may be on purpose: the answers still obey every law."""
 
-    key: str
-    switches: Switches
+    choices: Choices
     sentence: Sentence  # with the code of the choice
 
 
 def _honest(part: str) -> Iterator[HonestSweeps]:
-    """Yield the choices of a table that concern sweeps, not the test that ends them."""
-    for key, entry in _TABLE[part].items():
-        if entry.get("honest") and "test" not in entry["switch"]:
+    """Yield the choices of a table."""
+    for entry in _TABLE[part].values():
+        if "choices" in entry:
             words = with_code(entry["code"], Sentence(entry["sentence"], {}))
-            yield HonestSweeps(key, Switches(**entry["switch"]), words)
+            yield HonestSweeps(Choices(**entry["choices"]), words)
 
 
 STOPS = tuple(_honest("stop"))
 HONEST: Mapping[str, tuple[HonestSweeps, ...]] = {
     "ccd": (*_honest("ccd"), *STOPS),
-    "fabrik": (*_honest("fabrik"), *STOPS[:-1]),  # the last stop is CCD's own
+    "fabrik": STOPS[:-1],  # the last stop is CCD's own
 }
-ROOT_FIRST = next(choice.switches for choice in HONEST["ccd"] if choice.key == "root to tip")
+ROOT_FIRST = Choices(root_first=True)
 # A sweep that may end in its middle: each iteration rotates one joint of a sweep.
 AFTER_EACH_JOINT = HonestSweeps(
-    "tests after each joint",
-    Switches(budget=3),
+    Choices(sweep_of_a_joint=True),
     sentence("It is CCD that ends a sweep as soon as the effector is within the tolerance."),
 )

@@ -20,8 +20,7 @@ from ..greeting import Greeting
 from . import skeletons
 from .predictions import forward, path_to, solve
 from .skeletons import CaseFamily, PosedSkeleton
-from .switches import Switches
-from .textbook import SOLVERS
+from .textbook import SOLVERS, Choices
 
 TASK = "inverse_kinematics"
 # The rotations of single sweeps are at least so far from 0 and pi [rad].
@@ -186,7 +185,7 @@ def shows_stop(test: int, problem: TargetProblem) -> bool:
     inputs = request(problem, LOOSE, ALLOWED, "")
     for method in SOLVERS:
         _, x, sweeps = solve(method, inputs)
-        _, y, faulty_sweeps = solve(method, inputs, Switches(test=test))
+        _, y, faulty_sweeps = solve(method, inputs, Choices(test=test))
         miss = np.linalg.norm(y[problem.effector] - problem.target)
         if sweeps > ALLOWED // 2 or faulty_sweeps == sweeps or (test == 3 and miss <= 1.5 * LOOSE):
             return False

@@ -20,10 +20,9 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import LAWS, finding
 from . import pose_laws, rounding
-from .algebra import DEGREE
 from .honest import AFTER_EACH_JOINT, HONEST, ROOT_FIRST
 from .predictions import predict_inverse, solve
-from .switches import Switches
+from .textbook import Choices
 
 NAMES = {"ccd": "CCD", "fabrik": "FABRIK"}
 # The share of the sweeps that must be a textbook's to recognise its method.
@@ -218,7 +217,7 @@ def _ends_well(trial: PoseTrial) -> bool:
 def honest_variant(trials: Sequence[PoseTrial], method: str, greeting: Greeting) -> Sentence | None:
     """Return the difference between an honest solver and the textbook if it explains all sweeps."""
     for choice in HONEST[method]:
-        if _explains(trials, method, greeting, choice.switches):
+        if _explains(trials, method, greeting, choice.choices):
             return choice.sentence
     is_early = method == "ccd" and any(trial.has_ended for trial in trials)
     if is_early and all(_ends_after_a_joint(trial, greeting) for trial in trials):
@@ -231,16 +230,16 @@ def _ends_after_a_joint(trial: PoseTrial, greeting: Greeting) -> bool:
     inputs, links = trial.case.inputs, len(trial.case.facts["path"]) - 1
     rotations = links * inputs["max_iterations"]
     case = replace(trial.case, inputs={**inputs, "max_iterations": rotations})
-    prediction = predict_inverse("ccd", AFTER_EACH_JOINT.switches, case)
+    prediction = predict_inverse("ccd", AFTER_EACH_JOINT.choices, case)
     return difference(prediction, trial.pose.outputs) <= prediction_bound(greeting, trial.case)
 
 
 def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | None:
     """Return the scale or the cap of a CCD's rotations, if it explains all sweeps."""
-    for switched in (Switches(), ROOT_FIRST):
-        gain, cap = _damping(trials, switched)
-        scaled, capped = switched._replace(gain=gain), switched._replace(cap=cap)
-        is_degrees = abs(gain / DEGREE - 1.0) < SMALLEST  # radians taken for degrees, a mistake
+    for choices in (Choices(), ROOT_FIRST):
+        gain, cap = _damping(trials, choices)
+        scaled, capped = choices._replace(gain=gain), choices._replace(cap=cap)
+        is_degrees = abs(np.degrees(gain) - 1.0) < SMALLEST  # radians taken for degrees, a mistake
         if (
             SMALLEST < gain < 0.999
             and not is_degrees
@@ -257,7 +256,7 @@ def damping_of(trials: Sequence[PoseTrial], greeting: Greeting) -> Sentence | No
     return None
 
 
-def _damping(trials: Sequence[PoseTrial], switched: Switches) -> tuple[float, float]:
+def _damping(trials: Sequence[PoseTrial], choices: Choices) -> tuple[float, float]:
     """Return the scale of the first rotation of a sweep, and the largest angle [rad]."""
     gain, largest = 1.0, 0.0
     for trial in trials:
@@ -265,8 +264,8 @@ def _damping(trials: Sequence[PoseTrial], switched: Switches) -> tuple[float, fl
             continue
         links = trial.pose.path[:-1]
         start = trial.case.inputs["local_rotations"][links]
-        local, _, _ = solve("ccd", trial.case.inputs, switched)
-        first = 0 if switched.order == 1 else -1
+        local, _, _ = solve("ccd", trial.case.inputs, choices)
+        first = 0 if choices.root_first else -1
         angles = rotation.angle(trial.pose.local[links], start)
         gain = float(angles[first] / rotation.angle(local[links], start)[first])
         largest = max(largest, float(angles.max()))
@@ -274,10 +273,10 @@ def _damping(trials: Sequence[PoseTrial], switched: Switches) -> tuple[float, fl
 
 
 def _explains(
-    trials: Sequence[PoseTrial], method: str, greeting: Greeting, switched: Switches
+    trials: Sequence[PoseTrial], method: str, greeting: Greeting, choices: Choices
 ) -> bool:
     return all(
-        difference(predict_inverse(method, switched, trial.case), trial.pose.outputs)
+        difference(predict_inverse(method, choices, trial.case), trial.pose.outputs)
         <= prediction_bound(greeting, trial.case)
         for trial in trials
     )

@@ -26,7 +26,6 @@ from .predictions import forward, predict_track
 from .problems import TargetProblem
 from .report import report
 from .skeletons import CaseFamily
-from .switches import Switches
 
 TASK = "track"
 # Another method that is within this share of the reach is slow, not wrong.
@@ -76,7 +75,7 @@ def _is_smooth(problem: CurveProblem) -> bool:
     inputs = problems.request(start, TOLERANCE, problems.EASY, "") | {"curve": curve}
     case = Case("", TASK, inputs, "", HOLDS)
     for method in METHODS:
-        x = predict_track(method, Switches(), case)["path_positions"]
+        x = predict_track(method, case)["path_positions"]
         is_far = np.linalg.norm(x[:, -1] - curve, axis=-1).max() > TOLERANCE
         if is_far or np.linalg.norm(np.diff(x, axis=0), axis=-1).max() >= 0.5:
             return False
@@ -166,8 +165,8 @@ def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
     answer, bound = as_poses(exchange).answer, prediction_bound(greeting, exchange.case)
     assert isinstance(answer, Answer)
     warm, cold = (
-        difference(predict_track(method, Switches(frame_start=start), exchange.case), answer.values)
-        for start in (0, 1)
+        difference(predict_track(method, exchange.case, starts_anew), answer.values)
+        for starts_anew in (False, True)
     )
     return finding(CONTINUES, float(warm > bound >= cold))
 

@@ -22,6 +22,7 @@ from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
+from ..kinematics.early_ends import EARLY_ENDS
 from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS
@@ -67,7 +68,7 @@ def with_changed_line(
     if report.verdict > Verdict.RIGHT_EXCEPT:
         if share > 1.0 and named[0].share == 1.0:
             return report
-        doubtful, is_known = list[CaseJudgement](), share > 1.0
+        doubtful, is_known = list[CaseJudgement](), bool(named) and named[0].share == 1.0
     else:
         doubtful, is_known = _doubtful(report)
         if named or not doubtful:
@@ -94,19 +95,22 @@ def _least_share(report: TaskReport) -> float:
     """Return the share of answers that a program has to explain: many more than what is named.
 
     It has to explain all where answered positions are named, or how limits are read: a program
-    tells of rotations as well.
+    tells of rotations as well. So it has where a measured test ends solves.
     """
     named = report.diagnosis.explanations
     faults = {fault for explanation in named for fault in explanation.faults}
-    if named and (READINGS.keys() >= faults or (faults <= OF_POSES and named[0].share < 1.0)):
+    if named and (
+        READINGS.keys() | EARLY_ENDS >= faults or (faults <= OF_POSES and named[0].share < 1.0)
+    ):
         return 1.0
     return max((explanation.share for explanation in named), default=0.0) + MORE
 
 
 def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
-    """Return sweeps that keep all laws but may be a mistake's, and whether all targets are reached.
+    """Return answers that keep all laws but may be a mistake's, and whether it is a known one.
 
-    These are sweeps that differ from the textbook's, or else all sweeps within limits.
+    These are sweeps that differ from the textbook's, or else solves that end short of the nearest
+    point, or else all sweeps within limits where all targets are reached.
     """
     sweeps = [j for j in report.judgements if j.case.requirement == "must" and _is_single(j)]
     differing = [
@@ -117,11 +121,16 @@ def _doubtful(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
     ]
     if differing:
         return differing, False
+    if short := [j for j in report.judgements if _misses(j, "nearest point")]:
+        return short, True
     limited = [j for j in report.judgements if "cones" in j.case.inputs]
-    is_missed = any(
-        entry.verdict and entry.law == "target reached" for j in limited for entry in j.findings
-    )
+    is_missed = any(_misses(judgement, "target reached") for judgement in limited)
     return [j for j in sweeps if j in limited], not is_missed
+
+
+def _misses(judgement: CaseJudgement, law: str) -> bool:
+    """Return whether an answer is reproached by a law."""
+    return any(entry.verdict and entry.law == law for entry in judgement.findings)
 
 
 def _is_of_another(entry: Finding) -> bool:
