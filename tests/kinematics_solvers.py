@@ -1,5 +1,6 @@
 """Solvers of kinematics for the tests: the textbook, programs with faults, and the reference."""
 
+import inspect
 from dataclasses import replace
 
 import conformance_students as students
@@ -69,7 +70,7 @@ def textbook(task, method="ccd", choices=TEXTBOOK):
 
     def function(**inputs):
         if task == FORWARD:
-            return forward(inputs)
+            return dict(zip(("positions", "rotations"), forward(inputs), strict=True))
         if task == TRACK:
             answer = predict_track(method, case_of(task, inputs))
             answer = {"positions": answer["all_positions"], **answer}
@@ -88,7 +89,9 @@ def faulty(task, *codes, method="ccd"):
         source = coded_faults()[code].planted_in(source)
     names = {}
     exec(compile(source, "program", "exec"), names)
-    return names[method if task == INVERSE else task]
+    function = names[method if task == INVERSE else task]
+    parameters = inspect.signature(function).parameters
+    return lambda **inputs: function(**{name: inputs[name] for name in parameters})
 
 
 def reference(task, solver=""):

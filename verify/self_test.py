@@ -37,7 +37,7 @@ from .mass_spring.force_diagnosis import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
 from .mass_spring.options import Option, apply
 from .mass_spring.problem import problem_of, state_of, system_of
-from .one_line.right_programs import BY_LINES
+from .one_line.right_programs import BY_LINES, is_of
 from .verify import verify
 
 HONEST = "honest solvers"
@@ -135,14 +135,14 @@ def _kinematic_faults() -> Iterator[Subject]:
     for fault in coded_faults().values():
         if fault.family in FAMILIES and fault.code not in honest:
             method = "" if fault.task == FK else "fabrik" if fault.family == "FABRIK" else "ccd"
-            function = {fault.name: _function(method or FK, _in_another_form(fault))}
+            function = {fault.name: _function(fault.task, _in_another_form(fault, method), method)}
             yield from _subjects(FAMILIES[fault.family], fault.task, function, methods=(method,))
 
 
-def _in_another_form(fault: CodedFault) -> str:
+def _in_another_form(fault: CodedFault, method: str) -> str:
     """Return a program with a fault, not the fault's own one if another has its lines."""
-    for name, entry in PROGRAMS.items():
-        if entry["task"] == fault.task and name != fault.program:
+    for name in PROGRAMS:
+        if name != fault.program and is_of(name, fault.task, method):
             with suppress(ValueError):
                 return fault.planted_in(source_of(name))
     return fault.wrong_program
@@ -150,9 +150,9 @@ def _in_another_form(fault: CodedFault) -> str:
 
 def _limits() -> Iterator[Subject]:
     programs = [fault for fault in coded_faults().values() if fault.family == "LIMIT"]
-    wrong = {fault.name: _function("ccd", fault.wrong_program) for fault in programs}
+    wrong = {fault.name: _function(IK, fault.wrong_program, "ccd") for fault in programs}
     yield from _subjects("limits", IK, wrong, methods=("ccd",), limits=True)
-    right = {"program, limits": _function("ccd", programs[0].right_program)}
+    right = {"program, limits": _function(IK, programs[0].right_program, "ccd")}
     yield from _subjects(HONEST, IK, right, methods=("ccd",), limits=True)
     for solver in ("ccd", "fabrik"):
         function = {f"reference, {solver}, limits": partial(_solved, solver)}
@@ -176,11 +176,11 @@ def _robots() -> Iterator[Subject]:
     yield from _subjects(HONEST, ROBOTS, robots)
 
 
-def _function(task: str, program: str) -> Callable[..., Any]:
-    """Return the function of a program."""
+def _function(task: str, program: str, method: str = "") -> Callable[..., Any]:
+    """Return the function of a program: of a method, or else of the task."""
     names: dict[str, Any] = {}
     exec(compile(program, "program", "exec"), names)
-    return names[task]
+    return names.get(method) or names[task]
 
 
 def _followed(**inputs: Any) -> Mapping[str, Any]:

@@ -197,6 +197,11 @@ class Attempt:
         if not causes and report.greeting is not None:
             find_line = partial(with_changed_line, report, report.greeting, self.contestant)
             report = search.run(find_line, report)
+            original = report.original
+            if original is not None and not report.diagnosis.explained:
+                greeting = self.contestant.greeting
+                find_line = partial(with_changed_line, original, greeting, known_alone=True)
+                report = _unless_meant(report, search.run(find_line, original))
         return _with_cause(report, causes)
 
     def _diagnosis(
@@ -237,11 +242,11 @@ def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnos
     before = report.diagnosis
     if before.is_certain:
         return report
-    diagnosis, original = diagnose(report), report.original
-    if original is not None and not diagnosis.explained:
-        explanations = diagnose(original).explanations
+    diagnosis = diagnose(report)
+    if report.original is not None and not diagnosis.explained:
+        explanations = diagnose(report.original).explanations
         if report.verdict <= Verdict.UNDECIDED:
-            explanations = tuple(map(_unless_meant, filter(_is_of_inputs, explanations)))
+            explanations = tuple(map(_if_unmeant, filter(_is_of_inputs, explanations)))
         diagnosis = replace(diagnosis, explanations=explanations)
     explanations = (*before.explanations, *diagnosis.explanations)
     diagnosis = replace(diagnosis, explanations=explanations)
@@ -257,7 +262,15 @@ def _is_of_inputs(explanation: Explanation) -> bool:
     return not {code.split("-")[1] for code in explanation.codes} <= {"CLAIM"}
 
 
-def _unless_meant(explanation: Explanation) -> Explanation:
+def _unless_meant(report: TaskReport, original: TaskReport) -> TaskReport:
+    """Return a report by restricted requests with the explanations of answers to all requests."""
+    explanations = original.diagnosis.explanations
+    if report.verdict <= Verdict.UNDECIDED:
+        explanations = tuple(map(_if_unmeant, filter(_is_of_inputs, explanations)))
+    return replace(report, diagnosis=replace(report.diagnosis, explanations=explanations))
+
+
+def _if_unmeant(explanation: Explanation) -> Explanation:
     """Return the explanation of answers that are right if a restriction is meant."""
     words = sentence("If that is not meant: {what}", what=explanation.sentence)
     return replace(explanation, sentence=words)

@@ -307,7 +307,7 @@ def test_a_remedy_is_told_apart_from_its_cause_in_both_languages():
 
 
 def test_the_verdict_points_to_the_explanation():
-    report = report_of(frame=1)
+    report = report_of("PB-FK-001")
     assert "plumbob explain PB-FK-001" in str(advice(report.tasks))
 
 

@@ -213,7 +213,7 @@ def test_inference_hides_no_fault(task, function):
 def test_the_fault_that_explains_the_other_answers_is_still_named():
     task, function, _ = KINDS["no branches"]
     (report,) = judged(task, function).tasks
-    assert report.diagnosis.explanations[0].faults == ("parent by index",)
+    assert report.diagnosis.explanations[0].codes == ("PB-FK-016",)
 
 
 def by_method(method, **inputs):

@@ -205,6 +205,7 @@ def changed_forward(change):
     ],
     ids=["zero", "factor", "axes", "decimals", "shared"],
 )
+@pytest.mark.usefixtures("without_changed_lines")
 def test_a_relation_to_the_right_answers_is_reported(change, words):
     report = judged_some(FORWARD, changed_forward(change), every=4)
     assert [words in str(hint) for hint in report.diagnosis.hints] == [True]

@@ -24,7 +24,7 @@ def test_a_solver_that_stands_on_wrong_forward_kinematics_is_told_its_mistake(me
     functions = {FORWARD: faulty(FORWARD, code), INVERSE: faulty(INVERSE, code, method=method)}
     greeting = Greeting(1, (FORWARD, INVERSE), methods=(method,))
     forward, inverse = verify(FunctionContestant(functions, greeting)).tasks
-    assert forward.diagnosis.explanations[0].codes == [code]
+    assert forward.diagnosis.explanations[0].codes == (code,)
     (hint, *_) = inverse.diagnosis.hints
     assert f"Its forward_kinematics is wrong as well ({code})" in str(hint)
 

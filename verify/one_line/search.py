@@ -57,18 +57,23 @@ TOLERANCE = {"double": 1e-7, "single": 2e-4}
 
 
 def with_changed_line(
-    report: TaskReport, greeting: Greeting, contestant: Contestant | None = None
+    report: TaskReport,
+    greeting: Greeting,
+    contestant: Contestant | None = None,
+    known_alone: bool = False,
 ) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
     Beside a mistake that explains most answers, or where all targets are reached, the search is for
-    known faults that explain all. A `contestant` can be asked for what a dictionary tells apart.
+    known faults that explain all; so it is if `known_alone`. A `contestant` can be asked for what a
+    dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
         if share > 1.0 and named[0].share == 1.0:
             return report
-        doubtful, is_known = list[CaseJudgement](), bool(named) and named[0].share == 1.0
+        doubtful = list[CaseJudgement]()
+        is_known = known_alone or (bool(named) and named[0].share == 1.0)
     else:
         doubtful, is_known = _doubtful(report)
         if named or not doubtful:
