@@ -158,6 +158,18 @@ def test_right_solvers_are_right_with_any_seed(seed, method):
     assert judged(INVERSE, textbook(INVERSE, method), method, seed).verdict <= RIGHT_EXCEPT
 
 
+@pytest.mark.usefixtures("verdict_alone")
+def test_a_method_of_its_own_may_be_slow_but_not_away_from_a_target():
+    slow = textbook(INVERSE, "ccd", Choices(root_first=True))
+    assert judged(INVERSE, slow, "mine").verdict is RIGHT_EXCEPT
+
+    def away(**inputs):
+        sign = -1.0 if inputs["max_iterations"] == 60 else 1.0
+        return slow(**{**inputs, "target": sign * inputs["target"]})
+
+    assert judged(INVERSE, away, "mine").verdict is WRONG
+
+
 # ---- lies
 
 

@@ -43,6 +43,9 @@ WORLDS = {
     "rotated": Verdict.RIGHT_EXCEPT,
     "in other units": Verdict.RIGHT_EXCEPT,
 }
+# A solver of its own method that misses no larger share of the targets is slow there, not wrong:
+# CCD from the root is after 60 sweeps from a straight arm two thirds as far as at the start.
+FEW_MISSES = 0.1
 # Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
 # from the nearest point as they are.
 AS_SLOW = 1.5
@@ -92,10 +95,11 @@ def judged_trials(
         trial.judgement = _judge(trial, textbook, greeting)
     others_hold = not any(trial.is_wrong for trial in trials)
     comparison = sweeps.compare(sweep_trials, textbook, declared, others_hold, greeting)
+    is_slow = comparison.honest or (not textbook and _reaches_most(trials))
     by_name = {trial.case.name: trial for trial in trials}
     for trial in trials:
         trial.add(comparison.findings.get(trial.case.name, ()))
-        if comparison.honest:
+        if is_slow:
             trial.correct(partial(_forgive, trial.case))
         original = by_name.get(trial.case.facts.get("like", ""))
         if original and trial.pose.finite and original.pose.finite:
@@ -103,11 +107,21 @@ def judged_trials(
     return trials, comparison
 
 
+def _reaches_most(trials: Sequence[PoseTrial]) -> bool:
+    """Return whether a solver of its own method misses few of the targets that it can reach."""
+    solves = [t for t in trials if not t.is_sweep and t.case.facts["least"] == 0.0]
+    missed = [t for t in solves if any(map(_is_miss, t.judgement.findings))]
+    return len(missed) <= FEW_MISSES * len(solves)
+
+
+def _is_miss(entry: Finding) -> bool:
+    return entry.verdict is Verdict.WRONG and entry.law in ("target reached", "nearest point")
+
+
 def _forgive(case: Case, broken: Finding) -> Finding:
-    """Return a reservation where an honest, slower solver misses a target that it approaches."""
+    """Return a reservation where a right but slower solver misses a target that it approaches."""
     gained = case.facts["before"] - case.facts["least"]
-    is_missed = broken.law in ("target reached", "nearest point")
-    if not is_missed or broken.verdict is not Verdict.WRONG or broken.error >= gained:
+    if not _is_miss(broken) or broken.error >= gained:
         return broken
     reach = case.facts["reach"]
     return finding(SLOW, broken.error, broken.tolerance, law=broken.law, reach=reach)

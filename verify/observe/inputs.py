@@ -15,6 +15,7 @@ from ..gaps import difference
 from ..greeting import Greeting
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import solve
+from ..kinematics.textbook import SOLVERS
 from ..mass_spring.problem import all_forces, problem_of
 from .separation import MIN_CASES, Statement
 
@@ -146,7 +147,7 @@ def _forward(inputs: Mapping[str, Any], method: str) -> Mapping[str, Any]:
 
 
 def _inverse(inputs: Mapping[str, Any], method: str) -> Mapping[str, Any]:
-    local, positions, _ = solve(method or "ccd", inputs)
+    local, positions, _ = solve(method if method in SOLVERS else "ccd", inputs)
     return {"local_rotations": local, "positions": positions}
 
 
