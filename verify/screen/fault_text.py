@@ -38,10 +38,21 @@ def fault_help(words: Sequence[str], say: Say) -> Iterator[str]:
     family = [code for code in causes if code.startswith(f"{name}-")]
     matches = family or [c for c, cause in causes.items() if all(w in cause for w in folded)]
     if not matches:
-        near = get_close_matches(name, faults, n=1)
-        hint = f"nearest: {near[0]}" if near else "`plumbob explain` lists the families"
-        raise ValueError(f"code: expected a code of a fault, or words, got {text!r}; {hint}")
+        raise ValueError(f"code: {_why_unknown(name, text)}")
     return _listed([faults[code] for code in matches], say)
+
+
+def _why_unknown(name: str, text: str) -> str:
+    """Return why a name in capitals, typed as `text`, is no code: retired, or never given."""
+    code = re.fullmatch(r"PB-([A-Z]+)-(\d{3})", name)
+    if code and 0 < int(code[2]) <= FAMILIES.get(code[1], {"last": 0})["last"]:
+        return (
+            f"{name} is retired, its mistake shows as a changed line (PB-LINE); "
+            f"`plumbob explain PB-{code[1]}` lists those with a code of their own"
+        )
+    near = get_close_matches(name, coded_faults(), n=1)
+    hint = f"nearest: {near[0]}" if near else "`plumbob explain` lists the families"
+    return f"expected a code of a fault, or words, got {text!r}; {hint}"
 
 
 def _families(say: Say) -> Iterator[str]:
