@@ -13,7 +13,7 @@ from plumbob.verify.verify import verify
 SOME = [
     ("cpp", "ccd_world_left"),
     ("cpp", "forces_damping_sign"),
-    ("javascript", "fk_local_rotation"),
+    ("javascript", "fk_inverse_rotation"),
     ("javascript", "step_pins_overwritten"),
 ]
 
@@ -42,7 +42,7 @@ def is_named(report, fault):
     return FAULTS[fault].get("name") in first_names(report)
 
 
-@pytest.mark.sample("fk_local")
+@pytest.mark.sample("fk_inverse")
 @pytest.mark.parametrize(("language", "fault"), SOME)
 def test_a_planted_fault_is_named(language, fault, program):
     report = judged(program(language), fault)
