@@ -10,7 +10,7 @@ import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from itertools import chain
+from itertools import chain, product
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -41,6 +41,32 @@ FAMILIES: Mapping[str, Any] = _TABLE["families"]
 NOTES: Mapping[str, Any] = _TABLE["notes"]
 # The names of the programs with a dictionary of answers, by task or method.
 IN_DICTIONARY: Mapping[str, Any] = _TABLE["dictionary"]
+
+
+class TextChange(NamedTuple):
+    """A right program with texts in the place of others, of a table in `programs.toml`."""
+
+    kind: str  # a key of `one_line/faults.toml`
+    source: str  # the wrong program
+    function: str  # that the texts are in
+    right: str  # what is shown of the right program
+    wrong: str  # what is shown of the wrong one
+
+
+def changes_of(program: str) -> Iterator[TextChange]:
+    """Yield the wrong programs of a right program's tables: each combination of their texts."""
+    source = source_of(program)
+    for table in (table for table in _TABLE["tables"] if program in table["programs"]):
+        right, *names = table["lines"][0], *table["texts"]
+        for texts in product(*table["texts"].values()):
+            wrong, shown = table["lines"][1], table["shown"][1]
+            for name, text in zip(names, texts, strict=True):
+                wrong = wrong.replace(f"<{name}>", text)
+                shown = shown.replace(f"<{name}>", text)
+            yield TextChange(
+                table["kind"], source.replace(right, wrong), table["function"],
+                table["shown"][0], shown,
+            )  # fmt: skip
 
 
 class CodedFault(NamedTuple):

@@ -13,11 +13,11 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
-from ..fault_programs import IN_DICTIONARY, source_of
-from ..one_line.mutants import Program
+from ..fault_programs import IN_DICTIONARY, changes_of, source_of
+from ..one_line.mutants import ENTRIES, Program
 from ..one_line.right_programs import answer_of, faults_in
 from .entry import Dictionary, Entry, likelihood
-from .requests import FK, OUTPUTS, fractions, keys, requests
+from .requests import FK, OUTPUTS, fractions, is_solve, keys, requests
 
 # Differences of keys above this tell answers apart, the shortest distance of a look-up.
 DISTINCT = 1e-6
@@ -37,6 +37,7 @@ def digest(task: str, method: str) -> str:
     names = IN_DICTIONARY[method or task]
     parts: list[Any] = [(name, source_of(name)) for name in names]
     parts += [fault.lines for name in names for fault in faults_in(source_of(name), task, method)]
+    parts += [change.source for name in names for change in changes_of(name)]
     parts += [[np.ravel(v).tolist() for v in c.inputs.values()] for c in requests(task, method)]
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
@@ -52,15 +53,12 @@ def build(task: str, method: str, notify: Callable[[str], None] = lambda text: N
         program = Program(source_of(name))
         own = _row(partial(answer_of, program, method), cases, right)  # of another right choice
         for entry, run in _changes(name, program, cases, method, functions):
-            row = _row(run, cases, right)
+            row = _row(run, cases, right, entry.function in ("", *ENTRIES))
             if row is None or (own is not None and np.allclose(row, own, 0.0, DISTINCT)):
                 continue
-            equal = classes.setdefault((np.round(row / DISTINCT) + 0.0).tobytes(), [])
-            if not equal and not _is_stable(run, cases, right, row):
-                del classes[(np.round(row / DISTINCT) + 0.0).tobytes()]
-                continue
-            text = program.text_of(entry.function) if entry.function else ""
-            _add(equal, entry._replace(text=text), row)
+            key = (np.round(row / DISTINCT) + 0.0).tobytes()
+            if key in classes or _is_stable(run, cases, right, row):
+                _add(classes.setdefault(key, []), entry, row, program)
         notify(f"{name}: {len(classes)} answers")
     rows = sorted(
         (pair for equal in classes.values() for pair in equal),
@@ -70,11 +68,16 @@ def build(task: str, method: str, notify: Callable[[str], None] = lambda text: N
     return Dictionary(digest(task, method), entries, np.array([row for _, row in rows]))
 
 
-def _add(equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray) -> None:
-    """Add an entry to those that answer alike, the likeliest of which remain."""
+def _add(
+    equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray, program: Program
+) -> None:
+    """Add a change of a program to those that answer alike, the likeliest of which remain."""
     count = (equal[0][0].equal_count if equal else 0) + (len(entry.codes) < 2)
-    if all(entry[:6] != other[:6] for other, _ in equal):
-        equal.append((entry, row))
+    is_likely = len(equal) < EQUAL or likelihood(entry) < likelihood(equal[-1][0])
+    if is_likely and all(entry[:6] != other[:6] for other, _ in equal):
+        is_text = bool(entry.text or entry.codes)
+        text = entry.text if is_text else program.text_of(entry.function)
+        equal.append((entry._replace(text=text), row))
     equal.sort(key=lambda pair: likelihood(pair[0]))
     equal[:] = [(other._replace(equal_count=count), row) for other, row in equal[:EQUAL]]
 
@@ -92,9 +95,13 @@ def _changes(
     for codes in _codes(name, cases[0].task, method):
         entry = Entry(name, codes)
         with suppress(SyntaxError, ValueError):
-            wrong = entry.changed_program()
-            yield entry, partial(_within, wrong, passes, method)
-    program.observe(lambda: [answer(case) for case in cases])
+            yield entry, partial(_within, entry.changed_program(), passes, method)
+    for change in changes_of(name):
+        wrong = Program(change.source)
+        text = wrong.text_of(change.function)
+        entry = Entry(name, (), change.kind, change.function, change.right, change.wrong, text)
+        yield entry, partial(_within, wrong, passes, method)
+    program.observe(lambda: [answer(case) for case in cases if not is_solve(case)])
     if cases[0].task == FK:  # each program has conventions of its own
         functions.clear()
     functions -= {program.text_of(f) for f in IN_FORMS & program.names.keys()}
@@ -108,10 +115,10 @@ def _changes(
 
 
 def _codes(name: str, task: str, method: str) -> Iterator[tuple[str, ...]]:
-    """Yield the known faults of a program, of forward kinematics also two at once."""
+    """Yield the known faults of a program; of the first one also two at once."""
     codes = [fault.code for fault in faults_in(source_of(name), task, method)]
     yield from ((code,) for code in codes)
-    if task == FK and name == IN_DICTIONARY[FK][0]:
+    if name == IN_DICTIONARY[method or task][0]:
         yield from combinations(codes, 2)
 
 
@@ -122,15 +129,25 @@ def _within(
         return answer_of(program, method, case)
 
 
-def _row(run: Run, cases: Sequence[Case], right: Sequence[Mapping[str, Any]]) -> FloatArray | None:
-    """Return the keys of all answers; None if all are right, or none has numbers."""
+def _row(
+    run: Run, cases: Sequence[Case], right: Sequence[Mapping[str, Any]], with_solves: bool = True
+) -> FloatArray | None:
+    """Return the keys of all answers; None if all are right, or none has numbers.
+
+    Solves are asked of a change whose single sweeps are right: the keys of others are NaN.
+    """
     row = np.full((len(cases), len(OUTPUTS[cases[0].task])), np.nan)
     for i, case in enumerate(cases):
+        if is_solve(case) and (_is_wrong(row) or not with_solves):
+            break
         with suppress(Exception):  # of a changed program any may come
             row[i] = keys(run(case), right[i], case)
     row[~(np.abs(row) < LARGEST)] = np.nan
-    is_wrong = np.nanmax(np.abs(row), initial=0.0) > DISTINCT
-    return row if is_wrong else None
+    return row if _is_wrong(row) else None
+
+
+def _is_wrong(row: FloatArray) -> bool:
+    return bool(np.nanmax(np.abs(row), initial=0.0) > DISTINCT)
 
 
 def _is_stable(

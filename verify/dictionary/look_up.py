@@ -1,6 +1,6 @@
 """Look up the changes of right programs that answer a few requests as a solver does."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +16,7 @@ from ..greeting import Greeting
 from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
 from .entry import Dictionary, Entry, file_of, likelihood, read
-from .requests import TASKS, keys, requests, suitable
+from .requests import OUTPUTS, TASKS, is_solve, keys, requests, suitable
 
 # Keys differ by ten times the rounding of an answer: single precision loses three digits more.
 TOLERANCES = {"double": 1e-6, "single": 1e-4}
@@ -52,6 +52,8 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
             dictionaries[own] = read(file_of(task, own))
         except (OSError, ValueError):
             return Proposals(hint=_unreadable(file_of(task, own).name))
+    if greeting.fixed.max_iterations:
+        return Proposals(_known(dictionaries.values()))
     contestant.close()
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
@@ -61,11 +63,12 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
     for own in methods:
         base = Program(source_of(IN_DICTIONARY[own or task][0]))
         names = [case.name for case in requests(task, method)]
-        rows = np.full((len(names), 2), np.nan)
+        is_solved = [is_solve(case) for case in requests(task, method)]
+        rows = np.full((len(names), len(OUTPUTS[task])), np.nan)
         for case, answer in zip(cases, first, strict=True):
             rows[names.index(case.name)] = _keys_of(answer, case, base, own)
         is_wrong |= bool(np.nanmax(np.abs(rows), initial=0.0) > tolerance)
-        ranks += _matches(dictionaries[own], rows, tolerance)
+        ranks += _matches(dictionaries[own], rows, is_solved, tolerance)
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
     return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong)
 
@@ -88,19 +91,37 @@ def _is_same(first: Answer | Failure, second: Answer | Failure) -> bool:
 def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -> FloatArray:
     """Return the keys of an answer, NaN of a failure."""
     if isinstance(answer, Failure):
-        return np.full(2, np.nan)
+        return np.full(len(OUTPUTS[case.task]), np.nan)
     outputs = comparable(Exchange(case, answer, answer)).answer
     assert isinstance(outputs, Answer)
     return keys(outputs.values, answer_of(base, method, case), case)
 
 
-def _matches(dictionary: Dictionary, rows: FloatArray, tolerance: float) -> list[tuple[int, Entry]]:
-    """Return the entries with the keys of all answered requests, or (1) of a single wrong one."""
+def _known(dictionaries: Iterable[Dictionary]) -> list[Entry]:
+    """Return each single known fault, in the first of its programs.
+
+    A program that makes a constant number of sweeps answers no request as the dictionary has it.
+    """
+    first = dict[tuple[str, ...], Entry]()
+    for entry in (entry for dictionary in dictionaries for entry in dictionary.entries):
+        if len(entry.codes) == 1:
+            first.setdefault(entry.codes, entry)
+    return sorted(first.values(), key=likelihood)
+
+
+def _matches(
+    dictionary: Dictionary, rows: FloatArray, is_solve: Sequence[bool], tolerance: float
+) -> list[tuple[int, Entry]]:
+    """Return the entries with the keys of all answered requests, or (1) of a single wrong one.
+
+    An entry with wrong single sweeps has no keys of solves.
+    """
     answered = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
         gaps = np.abs(dictionary.keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
         is_wrong = np.any(np.abs(rows) > tolerance, axis=1)
     is_alike = np.all(gaps | ~answered, axis=2)
-    every, single = np.all(is_alike, axis=1), np.any(is_alike & is_wrong, axis=1)
+    is_unknown = np.all(np.isnan(dictionary.keys), axis=2) & is_solve
+    every, single = np.all(is_alike | is_unknown, axis=1), np.any(is_alike & is_wrong, axis=1)
     numbers = np.flatnonzero((every | single) & is_wrong.any())
     return [(int(not every[i]), dictionary.entries[i]) for i in numbers]

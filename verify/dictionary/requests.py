@@ -22,11 +22,16 @@ FK, IK = "forward_kinematics", "inverse_kinematics"
 # The tasks and methods with a dictionary.
 TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
-# Parents, effector and target of each: a tree with an inner effector, and a chain.
-SKELETONS = (
-    ([-1, 0, 1, 2, 1], 2, (0.9, -1.3, 0.8)),
-    ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6)),
-)
+# Parents, effector and target of each: a tree with an inner effector, a chain, one in a plane.
+TREE = ([-1, 0, 1, 2, 1], 2, (0.9, -1.3, 0.8))
+CHAIN = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6))
+IN_PLANE = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 0.0))
+# With tolerance and number of sweeps: single sweeps, then solves that end by either of them. CCD
+# needs 12 sweeps to the tolerance, FABRIK 10: most round distances end them elsewhere.
+PROBLEMS = (
+    (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*TREE, 0.0, 3),
+    (*CHAIN[:2], (-1.1, -0.6, 0.3), 4e-3, 16),
+)  # fmt: skip
 # The outputs that have keys, in their order: what poses have, and what the path has alone.
 OUTPUTS = {FK: ("positions", "rotations"), IK: ("local_rotations", "path")}
 # A size below which answers are compared absolutely.
@@ -34,28 +39,43 @@ SMALLEST = 1e-12
 
 
 def requests(task: str, method: str) -> list[Case]:
-    """Return the requests of a task and a method."""
+    """Return the requests of a task and a method: of poses those alone that differ in the start."""
     cases = []
-    for number, (parents, effector, target) in enumerate(SKELETONS):
-        joints = len(parents)
-        rotations = fractions(4 * joints, 7 * number + 3).reshape(joints, 4)
+    for number, problem in enumerate(PROBLEMS if task == IK else PROBLEMS[:3]):
+        parents, effector, target, tolerance, sweeps = problem
+        joints, start = len(parents), 7 * (number % 3)
+        offsets = fractions(3 * joints, start + 1).reshape(joints, 3)
+        rotations = fractions(4 * joints, start + 3).reshape(joints, 4)
+        if target[2] == 0.0:
+            offsets, rotations = offsets * [1, 1, 0], rotations * [1, 0, 0, 1]
         inputs: dict[str, Any] = {
             "parents": np.array(parents),
-            "offsets": fractions(3 * joints, 7 * number + 1).reshape(joints, 3),
+            "offsets": offsets,
             "local_rotations": rotations / np.linalg.norm(rotations, axis=1, keepdims=True),
         }
         if task == IK:
             inputs |= {"target": np.array(target), "effector": effector, "method": method}
-            inputs |= {"tolerance": 0.0, "max_iterations": 1}
+            inputs |= {"tolerance": tolerance, "max_iterations": sweeps}
         about = facts(inputs) if task == IK else {}
         cases.append(Case(f"telling {number + 1}", task, inputs, "telling", ABOUT, facts=about))
     return cases
 
 
+def is_solve(case: Case) -> bool:
+    """Return whether a request is of more than a single sweep."""
+    return bool(case.inputs.get("max_iterations", 1) > 1)
+
+
 def suitable(case: Case, greeting: Greeting) -> bool:
-    """Return whether a solver takes a request: free joints, which rotate in space."""
-    is_free = greeting.rotations and not (greeting.planar or greeting.limits)
-    return is_free and suits(case.inputs["parents"], greeting, case.inputs.get("effector"))
+    """Return whether a solver takes a request: free joints, in space or in a plane."""
+    is_planar = not case.inputs["offsets"][:, 2].any()
+    is_free = greeting.rotations and greeting.planar is is_planar and not greeting.limits
+    is_ended = greeting.fixed.tolerance is None or not case.inputs.get("tolerance")
+    return (
+        is_free
+        and is_ended
+        and suits(case.inputs["parents"], greeting, case.inputs.get("effector"))
+    )
 
 
 def keys(values: Mapping[str, Any], right: Mapping[str, Any], case: Case) -> FloatArray:

@@ -62,6 +62,7 @@ def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
         yield "condition", parsed(f"not ({text})")
     if text in scope.shapes:
         yield from _names(text, scope)
+        yield from _neighbours(text, parent, scope)
         yield from (("name", parsed(other)) for other in _of_one_form(text, scope))
         yield from _conversions(text, parent, scope)
         yield from _lost_factors(node, scope)
@@ -171,6 +172,13 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
         steps.append(f"max(parents[{text}], 0)")
     near = ("0", "-1", *steps) if kind == "index" else ()
     yield from ((kind, parsed(other)) for other in (*scope.alike(text), *near))
+
+
+def _neighbours(text: str, parent: Any, scope: Scope) -> Iterator[Change]:
+    """Yield an index of the next or the last item, and of the one before or the first."""
+    if isinstance(parent, ast.Subscript) and scope.shapes[text] == "int":
+        yield "index", parsed(f"min({text} + 1, len({ast.unparse(parent.value)}) - 1)")
+        yield "index", parsed(f"max({text} - 1, 0)")
 
 
 def _of_one_form(text: str, scope: Scope) -> Iterator[str]:

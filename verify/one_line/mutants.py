@@ -105,6 +105,12 @@ class Program:
         """Return the source of a function, with the change of a mutant while it is yielded."""
         return next(ast.unparse(part) for part in self._functions if part.name == function)
 
+    def mutant_of(self, kind: str, function: str, right: str, wrong: str, text: str) -> Mutant:
+        """Return a change, given the text of the function with it."""
+        names = dict[str, Any]()
+        exec(_compiled(ast.parse(text)), self.names, names)
+        return Mutant(kind, function, right, wrong, names[function])
+
     @contextmanager
     def within(self, passes: int) -> Iterator[None]:
         """Run the program, or stop it long after the passes that the right program takes."""

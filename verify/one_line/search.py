@@ -16,8 +16,9 @@ from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
 from ..dictionary.entry import Entry
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
+from ..dictionary.requests import TASKS
 from ..explain import MORE, Variant, explain, together
-from ..fault_programs import IN_DICTIONARY, NOTES, CodedFault, coded_faults, source_of
+from ..fault_programs import NOTES, CodedFault, coded_faults, source_of
 from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
@@ -42,8 +43,9 @@ MIN_DIFFERENT = 3
 MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
-# No further right program is changed after so many changes, of half a millisecond each.
-MAX_MUTANTS = 24_000
+# No further right program is changed after so many changes, of half a millisecond each; where
+# changes are looked up, few are left that only a search finds.
+MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
@@ -167,13 +169,14 @@ def changed_lines(
         for program in programs_of(report.task, report.method, greeting.step)
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
-    if proposals is not None and proposals.is_wrong:
+    if proposals is not None:
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
-        looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
-        programs = [program for program in programs if program.source not in looked_up]
+        # Answers that are right to all requests of the dictionary are wrong in special cases.
+        programs = [] if proposals.is_wrong else programs[:1]
     if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
+    most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
     for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()
@@ -182,7 +185,7 @@ def changed_lines(
         )
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
-        if (best and best[0].share == 1.0) or mutant_count > MAX_MUTANTS:
+        if (best and best[0].share == 1.0) or mutant_count > most:
             break
     return best if best and best[0].share >= MIN_SHARE else ()
 
@@ -281,8 +284,8 @@ def _of_changes(
                 faults = tuple(coded_faults()[code].name for code in entry.codes) or (str(number),)
                 changes[" + ".join(faults)] = entry
                 with suppress(SyntaxError, ValueError):
-                    predict = partial(_faulty_answer, entry.changed_program(), report, passes)
-                    yield Variant(faults, predict, is_special=not entry.codes)
+                    yield Variant(faults, _answer_of_entry(entry, program, report, passes),
+                                  is_special=not entry.codes)  # fmt: skip
 
     def describe(keys: Sequence[str]) -> Sentence:
         if not changes[keys[0]].codes:
@@ -292,6 +295,18 @@ def _of_changes(
 
     return explain(variants(), _telling(different, same), lambda _: tolerance, describe,
                    _trial(report))[0]  # fmt: skip
+
+
+def _answer_of_entry(
+    entry: Entry, program: Program, report: TaskReport, passes: Mapping[str, int]
+) -> Callable[[Case], Mapping[str, Any]]:
+    """Return the function that answers as an entry's change of a program."""
+    if entry.codes:
+        return partial(_faulty_answer, entry.changed_program(), report, passes)
+    mutant = program.mutant_of(entry.kind, entry.function, entry.right, entry.wrong, entry.text)
+    return partial(
+        _changed_answer, program, mutant, passes, partial(answer_of, program, report.method)
+    )
 
 
 def _telling(different: Sequence[Exchange], same: Sequence[Exchange]) -> list[Exchange]:
