@@ -1,6 +1,6 @@
 """Look up the changes of right programs that answer a few requests as a solver does."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -15,8 +15,9 @@ from ..gaps import difference
 from ..greeting import Greeting
 from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
+from .constant_sweeps import known_faults, makes_constant_sweeps
 from .entry import Dictionary, Entry, file_of, likelihood, read
-from .requests import OUTPUTS, TASKS, is_solve, keys, requests, suitable
+from .requests import IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
 
 # Keys differ by ten times the rounding of an answer: single precision loses three digits more.
 TOLERANCES = {"double": 1e-6, "single": 1e-4}
@@ -33,6 +34,7 @@ class Proposals(NamedTuple):
     """What a look-up proposes."""
 
     entries: Sequence[Entry] = ()  # the likeliest first
+    sweeps: int | None = None  # that are made whatever is asked
     is_wrong: bool = True  # whether the solver answers a request otherwise than right programs
     hint: Sentence | None = None  # why nothing is looked up, or that no file can be read
 
@@ -52,13 +54,17 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
             dictionaries[own] = read(file_of(task, own))
         except (OSError, ValueError):
             return Proposals(hint=_unreadable(file_of(task, own).name))
-    if greeting.fixed.max_iterations:
-        return Proposals(_known(dictionaries.values()))
     contestant.close()
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
         return Proposals(hint=UNSTEADY)
     tolerance = TOLERANCES[greeting.precision]
+    if task == IK and makes_constant_sweeps(cases, first):
+        assert isinstance(first[0], Answer)
+        base = Program(source_of(IN_DICTIONARY[methods[0]][0]))
+        known = known_faults(base, dictionaries.values(), methods[0], cases[0], first[0], tolerance)
+        if known[1] != 1:  # which solves show better
+            return Proposals(*known)
     ranks, is_wrong = list[tuple[int, Entry]](), False
     for own in methods:
         base = Program(source_of(IN_DICTIONARY[own or task][0]))
@@ -70,7 +76,7 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
         is_wrong |= bool(np.nanmax(np.abs(rows), initial=0.0) > tolerance)
         ranks += _matches(dictionaries[own], rows, is_solved, tolerance)
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
-    return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong)
+    return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong=is_wrong)
 
 
 def _unreadable(file: str) -> Sentence:
@@ -95,18 +101,6 @@ def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -
     outputs = comparable(Exchange(case, answer, answer)).answer
     assert isinstance(outputs, Answer)
     return keys(outputs.values, answer_of(base, method, case), case)
-
-
-def _known(dictionaries: Iterable[Dictionary]) -> list[Entry]:
-    """Return each single known fault, in the first of its programs.
-
-    A program that makes a constant number of sweeps answers no request as the dictionary has it.
-    """
-    first = dict[tuple[str, ...], Entry]()
-    for entry in (entry for dictionary in dictionaries for entry in dictionary.entries):
-        if len(entry.codes) == 1:
-            first.setdefault(entry.codes, entry)
-    return sorted(first.values(), key=likelihood)
 
 
 def _matches(

@@ -43,6 +43,8 @@ MIN_DIFFERENT = 3
 MIN_SHARE = 0.75
 # Cases for which a right program goes through its loops more often are left out: they take long.
 MAX_PASSES = 200
+# But not if they go as often through them for the shortest case, as a constant number of sweeps.
+LONGER = 3
 # No further right program is changed after so many changes, of half a millisecond each; where
 # changes are looked up, few are left that only a search finds.
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
@@ -170,6 +172,8 @@ def changed_lines(
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
     if proposals is not None:
+        if proposals.sweeps is not None:
+            compared = [_with_sweeps(exchange, proposals.sweeps) for exchange in compared]
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -309,6 +313,12 @@ def _answer_of_entry(
     )
 
 
+def _with_sweeps(exchange: Exchange, count: int) -> Exchange:
+    """Return an answer with the number of sweeps that it has, whatever was asked."""
+    inputs = {**exchange.case.inputs, ITERATIONS: count}
+    return replace(exchange, case=replace(exchange.case, inputs=inputs))
+
+
 def _telling(different: Sequence[Exchange], same: Sequence[Exchange]) -> list[Exchange]:
     """Return answers that a program does not give, then no more of the others."""
     return [*different, *same[: max(len(different), MIN_DIFFERENT)]]
@@ -328,11 +338,12 @@ def _compare(
 
     The passes through its loops are by the names of cases; answers of too many are left out.
     """
+    answers = [program.count_passes(partial(run, exchange.case)) for exchange in compared]
+    most = max(MAX_PASSES, LONGER * min((count for _, count in answers), default=0))
     passes, different, same = dict[str, int](), list[Exchange](), list[Exchange]()
-    for exchange in compared:
+    for exchange, (right, count) in zip(compared, answers, strict=True):
         assert isinstance(exchange.answer, Answer)
-        right, count = program.count_passes(partial(run, exchange.case))
-        if count <= MAX_PASSES:
+        if count <= most:
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
             (same if is_same else different).append(exchange)

@@ -1,0 +1,80 @@
+"""The known faults of a solver that makes a constant number of sweeps, whatever is asked."""
+
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from ..case import Case
+from ..contestant import Answer, Exchange, Failure
+from ..gaps import difference
+from ..one_line.mutants import Program
+from ..one_line.right_programs import answer_of, comparable
+from .entry import Dictionary, Entry, likelihood
+
+# The most sweeps that are tried: most constants are smaller, or enough for poses to stay.
+MAX_SWEEPS = 60
+# The passes through loops that a sweep of a small skeleton needs, and more.
+PASSES = 100
+# Poses that a further sweep changes by less stay.
+STAYING = 1e-12
+# Answers of equal sweeps differ by less, in single precision too.
+SAME = 1e-6
+
+
+def makes_constant_sweeps(cases: Sequence[Case], answers: Sequence[Answer | Failure]) -> bool:
+    """Return whether the first request has the answer of one with more sweeps of the same start."""
+    case, answer = cases[0], answers[0]
+    return any(
+        np.array_equal(other.inputs["target"], case.inputs["target"])
+        and isinstance(answer, Answer)
+        and isinstance(other_answer, Answer)
+        and difference(answer.values, other_answer.values) <= SAME
+        for other, other_answer in zip(cases[1:], answers[1:], strict=True)
+    )
+
+
+def known_faults(
+    base: Program, dictionaries: Iterable[Dictionary], method: str, case: Case, answer: Answer,
+    tolerance: float,
+) -> tuple[list[Entry], int | None]:  # fmt: skip
+    """Return the known faults that answer a request so after some sweeps, and that number.
+
+    There are none if the right program does.
+    """
+    outputs = comparable(Exchange(case, answer, answer))
+    count = _sweeps(base, method, outputs, tolerance)
+    entries = list[Entry]()
+    for entry in known(dictionaries) if count is None else ():
+        with suppress(SyntaxError, ValueError):
+            own = _sweeps(entry.changed_program(), method, outputs, tolerance)
+            if own is not None and count in (None, own):
+                entries, count = [*entries, entry], own
+    return entries, count
+
+
+def known(dictionaries: Iterable[Dictionary]) -> list[Entry]:
+    """Return each single known fault, in the first of its programs."""
+    first = dict[tuple[str, ...], Entry]()
+    for entry in (entry for dictionary in dictionaries for entry in dictionary.entries):
+        if len(entry.codes) == 1:
+            first.setdefault(entry.codes, entry)
+    return sorted(first.values(), key=likelihood)
+
+
+def _sweeps(program: Program, method: str, exchange: Exchange, tolerance: float) -> int | None:
+    """Return after how many sweeps a program has an answer, None if after none of those tried."""
+    case = exchange.case
+    assert isinstance(exchange.answer, Answer)
+    for count in range(1, MAX_SWEEPS + 1):
+        values, before = {}, case.inputs["local_rotations"]
+        with suppress(Exception), program.within(PASSES):  # of a changed program any may come
+            values = answer_of(program, method, case)
+        if difference(values, exchange.answer.values) <= tolerance:
+            return count
+        pose = values.get("local_rotations")
+        if pose is None or abs(pose - before).max() <= STAYING:
+            return None
+        case = replace(case, inputs={**case.inputs, "local_rotations": pose})
+    return None
