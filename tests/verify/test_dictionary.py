@@ -10,10 +10,19 @@ from plumbob.verify.dictionary import look_up as module
 from plumbob.verify.dictionary.build import digest
 from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, read
 from plumbob.verify.dictionary.look_up import UNSTEADY, look_up
-from plumbob.verify.dictionary.requests import FK, TASKS, keys, requests
-from plumbob.verify.fault_programs import IN_DICTIONARY, coded_faults, source_of
+from plumbob.verify.dictionary.requests import (
+    FK,
+    IK,
+    OUTPUTS,
+    TASKS,
+    is_solve,
+    keys,
+    requests,
+    suitable,
+)
+from plumbob.verify.fault_programs import IN_DICTIONARY, changes_of, coded_faults, source_of
 from plumbob.verify.functions import FunctionContestant
-from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting
 from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.one_line.right_programs import answer_of
@@ -30,7 +39,10 @@ def recomputed(entry, task, method):
     program, base = entry.changed_program(), Program(source_of(IN_DICTIONARY[method or task][0]))
     rows = []
     for case in requests(task, method):
-        with np.errstate(all="ignore"), program.within(100):
+        if is_solve(case) and np.nanmax(np.abs(rows), initial=0.0) > 1e-6:
+            rows.append(np.full(len(OUTPUTS[task]), np.nan))
+            continue
+        with np.errstate(all="ignore"), program.within(300):
             try:
                 values = answer_of(program, method, case)
             except Exception:
@@ -54,7 +66,7 @@ def test_a_dictionary_is_of_the_programs_as_they_are(task, method):
 
 
 def test_dictionaries_are_small():
-    assert sum(file_of(*key).stat().st_size for key in TASKS) <= 1_000_000
+    assert sum(file_of(*key).stat().st_size for key in TASKS) <= 3_000_000
 
 
 def test_a_file_holds_what_was_written(tmp_path):
@@ -104,7 +116,7 @@ def test_a_known_fault_is_proposed_first_in_each_precision(kind, precision):
 def test_requests_are_sent_twice_to_a_new_process():
     solver = Solver(source_of("forward kinematics"))
     result = proposals(solver)
-    names = [case.name for case in requests(FK, "")]
+    names = [case.name for case in requests(FK, "") if suitable(case, solver.greeting)]
     assert solver.log == ["close", *names, *names]
     assert (result.entries, result.is_wrong) == ([], False)
 
@@ -132,10 +144,53 @@ def test_without_a_readable_dictionary_the_search_goes_on(content, tmp_path, mon
     assert [arguments[-1] for arguments in searched] == [None]  # without proposals
 
 
-@pytest.mark.parametrize("restriction", [{"planar": True}, {"rotations": False}, {"limits": True}])
+@pytest.mark.parametrize("restriction", [{"rotations": False}, {"limits": True}])
 def test_a_restricted_solver_has_no_dictionary(restriction):
     greeting = Greeting(PROTOCOL, (FK,), **restriction)
     assert look_up(Solver(source_of("forward kinematics")), FK, "", greeting) is None
+
+
+def test_a_planar_solver_gets_requests_in_its_plane():
+    greeting = Greeting(PROTOCOL, (FK,), planar=True)
+    solver = Solver(coded_faults()[FAULT].wrong_program)
+    assert FAULT in {code for entry in look_up(solver, FK, "", greeting).entries[:3]
+                     for code in entry.codes}  # fmt: skip
+    assert solver.log == ["close", "telling 3", "telling 3"]
+
+
+def ccd_proposals(source, **declared):
+    names = {}
+    exec(compile(source, "solver", "exec"), names)
+    greeting = Greeting(PROTOCOL, (IK,), methods=("ccd",), **declared)
+    return look_up(FunctionContestant({IK: names["ccd"]}, greeting), IK, "ccd", greeting)
+
+
+def test_an_end_that_single_sweeps_do_not_show_is_proposed():
+    result = ccd_proposals(coded_faults()["PB-STOP-001"].wrong_program)
+    assert result.entries[0].codes == ("PB-STOP-001",)
+
+
+def test_frames_are_proposed():
+    changes = [change for change in changes_of("ccd") if "R[joint], x[" in change.wrong]
+    assert {change.kind for change in changes} == {"frame"}
+    result = ccd_proposals(changes[0].source)
+    assert changes[0].wrong in {entry.wrong for entry in result.entries}
+
+
+def test_each_known_fault_is_proposed_once_where_sweeps_are_constant():
+    result = ccd_proposals(source_of("ccd"), fixed=Fixed(max_iterations=20))
+    codes = [entry.codes for entry in result.entries]
+    assert result.is_wrong
+    assert {len(each) for each in codes} == {1}
+    assert len(codes) == len(set(codes)) <= module.MAX_CANDIDATES
+
+
+@pytest.mark.parametrize("program", [name for names in IN_DICTIONARY.values() for name in names])
+def test_tables_have_their_texts_once_in_their_programs(program):
+    source = source_of(program)
+    for change in changes_of(program):
+        assert change.source != source
+        compile(change.source, program, "exec")
 
 
 def test_a_second_mistake_in_another_request_hides_no_first():
