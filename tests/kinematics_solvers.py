@@ -84,9 +84,11 @@ def textbook(task, method="ccd", choices=TEXTBOOK):
 
 def faulty(task, *codes, method="ccd"):
     """Return the function of a right program with known faults in its lines."""
-    source = source_of({FORWARD: "forward kinematics", TRACK: "track"}.get(task, method))
-    for code in codes:
-        source = coded_faults()[code].planted_in(source)
+    faults = [coded_faults()[code] for code in codes]
+    own = {FORWARD: "forward kinematics", TRACK: "track"}.get(task, method)
+    source = source_of(faults[0].program if faults[0].task == task else own)
+    for fault in faults:
+        source = fault.planted_in(source)
     names = {}
     exec(compile(source, "program", "exec"), names)
     function = names[method if task == INVERSE else task]
