@@ -14,14 +14,11 @@ from .kinematics import (
     inverse_kinematics,
     resample,
     resample_diagnosis,
-    robot_inverse_diagnosis,
+    robot_diagnosis,
     robot_inverse_kinematics,
     robot_jacobian,
-    robot_jacobian_diagnosis,
     robot_track,
-    robot_track_diagnosis,
     robot_velocity,
-    robot_velocity_diagnosis,
     track,
     track_diagnosis,
 )
@@ -58,10 +55,10 @@ _PAIRS: Sequence[tuple[Any, Any]] = (
     (energy, energy_diagnosis),
     (Stepping("mass_spring_step"), step_diagnosis),
     (Stepping("mass_spring_motion"), step_diagnosis),
-    (robot_jacobian, robot_jacobian_diagnosis),
-    (robot_velocity, robot_velocity_diagnosis),
-    (robot_inverse_kinematics, robot_inverse_diagnosis),
-    (robot_track, robot_track_diagnosis),
+    (robot_jacobian, robot_diagnosis),
+    (robot_velocity, robot_diagnosis),
+    (robot_inverse_kinematics, robot_diagnosis),
+    (robot_track, robot_diagnosis),
 )
 DISCIPLINES: dict[str, Discipline] = {
     laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose if causes else _of_laws)

@@ -18,8 +18,7 @@ from ..judgement import Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints
 from . import robot_models, rounding
 from .report import report
-from .robot_models import mechanism, tool_pose
-from .robot_textbook import Inputs
+from .robot_models import Inputs, mechanism, tool_pose
 from .skeletons import suits
 
 TASK = "robot_jacobian"

@@ -25,8 +25,8 @@ from plumbob.reference.skeleton import Pose
 from plumbob.text.sentence import Sentence, sentence
 
 from ..judgement import CaseJudgement, Verdict
-from .robot_textbook import Inputs, ancestors
 
+Inputs = Mapping[str, Any]
 ITERATIONS = 200
 PRECISION = ("tolerance", "tolerance_rotation", "max_iterations")
 TOLERANCES = {"double": 1e-5, "single": 1e-3}
@@ -80,6 +80,14 @@ def feature_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
         feature=features,
     )
     return (words,)
+
+
+def ancestors(inputs: Inputs) -> FloatArray:
+    """Return 1 for the joints that move the tool, 0 for the others, (joint,)."""
+    moves, j = np.zeros(len(inputs["parents"])), inputs["effector"]
+    while j >= 0:
+        moves[j], j = 1.0, inputs["parents"][j]
+    return moves
 
 
 def mechanism(inputs: Mapping[str, Any]) -> Articulation:

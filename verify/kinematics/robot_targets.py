@@ -22,6 +22,7 @@ from .robot_models import (
     PRECISION,
     REDUNDANT,
     TOLERANCES,
+    ancestors,
     mechanism,
     robots,
     size_of,
@@ -30,7 +31,6 @@ from .robot_models import (
     tool_pose,
     urdf,
 )
-from .robot_textbook import ancestors
 from .skeletons import suits
 
 TASK = "robot_inverse_kinematics"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Articulation
+from plumbob.reference import Articulation, rotation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
@@ -21,9 +21,7 @@ from ..laws import finding, judge_case, not_finite
 from . import robot_models, rounding
 from .report import report
 from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
-from .robot_models import mechanism
-from .robot_readings import RIGHT
-from .robot_textbook import Inputs
+from .robot_models import Inputs, mechanism, tool_pose
 from .skeletons import suits
 
 TASK = "robot_velocity"
@@ -94,8 +92,9 @@ def _is_regular(values: FloatArray, rank: int) -> bool:
 def right_equation(inputs: Inputs, frame: Convention = FRAMES[0]) -> Equation:
     """Return the equation that right speeds solve, in the world or for the point at its origin."""
     twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
-    tool = RIGHT.frames(inputs, inputs["q"])
-    return right_jacobian(inputs, frame), frame(twist[:, None], tool.position, tool.rotation)[:, 0]
+    tool = tool_pose(inputs, inputs["q"])
+    R = rotation.to_matrix(tool.rotations)
+    return right_jacobian(inputs, frame), frame(twist[:, None], tool.positions, R)[:, 0]
 
 
 def shortest_speeds(equation: Equation) -> FloatArray:

@@ -16,11 +16,9 @@ from ..case import Case
 from ..contestant import Answer, Exchange
 from ..judgement import Finding
 from ..laws import finding
-from .robot_models import mechanism, tool_pose
+from .robot_models import ancestors, mechanism, tool_pose
 from .robot_motions import ITERATIONS
-from .robot_readings import RIGHT
 from .robot_targets import LIMIT_STEP
-from .robot_textbook import ancestors
 
 # A frame is a jump if the joints move so many times as far as the reference has to from the same
 # frame, and this much farther [rad]: solvers that weight joints, or move in the null space, may.
@@ -213,7 +211,7 @@ def is_at_minimum(motion: Trajectory) -> BoolArray:
 
     Solvers weigh rotations as they like: some weight may make it the least.
     """
-    e, J = motion.twists(motion.q), next(RIGHT.jacobians(motion.inputs, motion.q))
+    e, J = motion.twists(motion.q), jacobian(mechanism(motion.inputs), motion.q, -1)
     J = J * ~motion.at_limits[:, None, :]
     linear, angular = (
         np.einsum("fij,fi->fj", J[:, part], e[:, part]) for part in (slice(3), slice(3, 6))

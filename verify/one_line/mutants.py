@@ -23,7 +23,7 @@ FILE, PASS = "right program", "_pass"
 MAX_PASSES = 5
 UNLIMITED = 10**9
 # The functions that are called with a request.
-ENTRIES = {*TASKS, "ccd", "fabrik"}
+ENTRIES = {*TASKS, "ccd", "fabrik", "tool_step"}
 # What an expression raises whose names have no value yet, or not the usual one.
 NO_VALUE = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 

@@ -16,6 +16,7 @@ from ..greeting import Step
 from ..kinematics.sweeps import PoseTrial
 from ..kinematics.textbook import SOLVERS as METHODS
 from ..task import BUILDS_ON, TASKS
+from . import tool_steps
 from .mutants import Program
 
 _TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
@@ -97,6 +98,8 @@ def comparable(exchange: Exchange) -> Exchange:
 
 def answer_of(program: Program, method: str, case: Case) -> Mapping[str, Any]:
     """Return the comparable outputs of a right program; raise ArithmeticError if it has none."""
+    if case.task == tool_steps.TASK:
+        return tool_steps.answer_of(program, case)
     function = program.names.get(method) or program.names.get(case.task)
     if function is None:
         function = next(program.names[m] for m in ("ccd", "fabrik") if m in program.names)

@@ -28,6 +28,7 @@ from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS
 from ..precision import judging_greeting
+from . import tool_steps
 from .mutants import Mutant, Program
 from .right_programs import FAULTS, KINDS, answer_of, comparable, faults_in, programs_of
 
@@ -92,7 +93,11 @@ def with_changed_line(
             if proposals.hint == UNSTEADY:
                 return report
             proposals = None  # without a dictionary all lines are searched
-    explanations = changed_lines(report, greeting, doubtful, is_known, proposals)
+    explanations = tuple[Explanation, ...]()
+    for view in (*tool_steps.views(report), report) if not doubtful else (report,):
+        explanations = explanations or changed_lines(
+            view, greeting, doubtful, is_known, proposals
+        )
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -164,6 +169,7 @@ def changed_lines(
     if not compared:
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
+    tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
     best, functions = tuple[Explanation, ...](), set[str]()
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
@@ -178,7 +184,8 @@ def changed_lines(
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
         programs = [] if proposals.is_wrong else programs[:1]
-    if doubtful and any(_gives(program, report, compared, tolerance) for program in programs):
+    is_choice = bool(doubtful) or report.task == tool_steps.TASK
+    if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
     most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
     for program in () if best else programs:

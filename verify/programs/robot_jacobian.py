@@ -4,5 +4,5 @@ from .parts.mechanism import tool_jacobian
 
 
 def robot_jacobian(q, **robot):
-    J, tool_rotation = tool_jacobian(q, **robot)
+    J, tool, tool_rotation = tool_jacobian(q, **robot)
     return {"jacobian": J}

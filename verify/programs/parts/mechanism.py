@@ -18,7 +18,7 @@ def rotation(axis, angle):
 
 
 def tool_jacobian(q, slides, effector, parents, **robot):
-    """Return the tool's Jacobian in the world, (6, joint), and its rotation matrix."""
+    """Return the tool's Jacobian in the world, (6, joint), its position and its rotation matrix."""
     x, R, axes = np.zeros((len(q), 3)), np.zeros((len(q), 3, 3)), np.zeros((len(q), 3))
     for j in range(len(q)):
         p = parents[j]
@@ -41,4 +41,4 @@ def tool_jacobian(q, slides, effector, parents, **robot):
             J[:3, j] = np.cross(axes[j], tool - x[j])
             J[3:, j] = axes[j]
         j = parents[j]
-    return J, tool_rotation
+    return J, tool, tool_rotation

@@ -1,0 +1,148 @@
+"""Answers about robots as equations J dq = e of a tool's step, whatever their damping and length.
+
+Solvers of the same equations give different coordinates: they damp and shorten steps as they like.
+A single iteration of any solver shows its J and e nevertheless, and where it ends, its e is zero.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from plumbob.reference.arguments import FloatArray
+
+from ..case import Case
+from ..contestant import Answer
+from ..judgement import CaseJudgement, TaskReport
+from ..kinematics.robot_inverse_kinematics import trajectory_of
+from ..kinematics.robot_motions import TASK as TRACK
+from ..kinematics.robot_targets import LIMIT_STEP, TOLERANCE
+from ..kinematics.robot_targets import TASK as INVERSE
+from ..laws import finding
+from .mutants import Program
+
+# The task of the right programs of J and e, which no solver is asked.
+TASK = "tool_step"
+# Directions of steps agree to this: dampings between those that are tried leave less.
+SAME_STEP = 3e-3
+# Fewer joints than this reach no pose in other kinematics, and any damping fits their steps.
+MIN_JOINTS = 6
+# Steps shorter than this are rounding [rad, m], and joints as near to a limit are at the limit.
+SHORTEST = 1e-6
+# A solver has reached what is within so many tolerances: it may have a test of its own.
+LENIENT = 10.0
+# How far from its answer a solver is not at its target [rad, m].
+ELSEWHERE = 0.3
+# Squared dampings [m^2], and the ratios by which the best one is refined twice.
+DAMPINGS = np.geomspace(1e-9, 1e4, 53)
+REFINEMENTS = (np.geomspace(0.57, 1.77, 25), np.geomspace(0.95, 1.05, 25))
+# Of a motion this many frames, spread evenly, tell enough.
+MAX_FRAMES = 3
+
+
+def views(report: TaskReport) -> Iterator[TaskReport]:
+    """Yield reports on the same answers as single steps, and as coordinates on their targets."""
+    if report.task not in (INVERSE, TRACK):
+        return
+    poses = [pose for judgement in report.judgements for pose in _poses(judgement)]
+    steps = [_as_step(pose) for pose in poses if _is_step(pose)]
+    ends = [_as_end(pose) for pose in poses if _is_end(pose)]
+    for judgements in (steps, ends):
+        if judgements:
+            yield replace(report, task=TASK, judgements=judgements)
+
+
+def _poses(judgement: CaseJudgement) -> Iterator[CaseJudgement]:
+    """Yield the answer to a single target, or some frames of a motion as such answers."""
+    case, answer = judgement.case, judgement.answer
+    if not isinstance(answer, Answer) or not np.isfinite(answer.values.get("q", np.nan)).all():
+        return
+    if len(case.inputs["axes"]) < MIN_JOINTS or case.family in (LIMIT_STEP, TOLERANCE):
+        return
+    if case.task == INVERSE:
+        yield judgement
+        return
+    q = answer.values["q"]
+    previous = np.concatenate([case.inputs["start"][None], q[:-1]])
+    for i in np.unique(np.linspace(0, len(q) - 1, MAX_FRAMES).astype(int)):
+        inputs = {**case.inputs, "start": previous[i]}
+        inputs |= {f"target_{name}": case.inputs[f"target_{name}s"][i]
+                   for name in ("position", "rotation")}  # fmt: skip
+        frame = replace(case, name=f"{case.name}, frame {i}", inputs=inputs)
+        yield replace(judgement, case=frame, answer=Answer({"q": q[i]}, 0.0))
+
+
+def _is_step(pose: CaseJudgement) -> bool:
+    """Return whether an answer is a single iteration that meets no limit."""
+    assert isinstance(pose.answer, Answer)
+    inputs, q = pose.case.inputs, pose.answer.values["q"]
+    is_free = (q < inputs["upper"] - SHORTEST) & (q > inputs["lower"] + SHORTEST)
+    is_moved = np.abs(q - inputs["start"]).max() > SHORTEST
+    return bool(inputs["max_iterations"] == 1 and is_free.all() and is_moved)
+
+
+def _is_end(pose: CaseJudgement) -> bool:
+    """Return whether an answer is a whole solve for a target in reach."""
+    return bool(pose.case.inputs["max_iterations"] > 1 and np.all(pose.case.facts["reachable"]))
+
+
+def _as_step(pose: CaseJudgement) -> CaseJudgement:
+    """Return a single iteration as the direction of its step."""
+    assert isinstance(pose.answer, Answer)
+    start = pose.case.inputs["start"]
+    step = pose.answer.values["q"] - start
+    direction = step / np.linalg.norm(step)
+    inputs = {**pose.case.inputs, "q": start}
+    case = replace(pose.case, task=TASK, inputs=inputs, facts={"step": step})
+    motion = trajectory_of(pose.case, pose.answer.values)
+    (J,), (e,) = motion.jacobians, motion.twists(motion.previous)
+    gap = float(np.abs(nearest_step(J, e, step) - direction).max())
+    findings = (finding("target reached", gap, SAME_STEP),)
+    return replace(pose, case=case, answer=Answer({"step": direction}, 0.0), findings=findings)
+
+
+def _as_end(pose: CaseJudgement) -> CaseJudgement:
+    """Return an answer as coordinates at which a solver is on its target, and not elsewhere."""
+    assert isinstance(pose.answer, Answer)
+    inputs = {**pose.case.inputs, "q": pose.answer.values["q"]}
+    case = replace(pose.case, task=TASK, inputs=inputs, facts={})
+    return replace(pose, case=case, answer=Answer({"is_reached": np.array([1.0, 0.0])}, 0.0))
+
+
+def answer_of(program: Program, case: Case) -> Mapping[str, Any]:
+    """Return what the equations of a program make of an answer; raise ArithmeticError if nothing.
+
+    These are the step along its equations that is nearest to the answer's, or whether it is on its
+    target at the answer and elsewhere.
+    """
+    inputs = dict(case.inputs)
+    q = inputs.pop("q")
+    equation = program.names[TASK]
+    try:
+        if "step" in case.facts:
+            return {"step": nearest_step(*equation(q, **inputs), case.facts["step"])}
+        other = q + ELSEWHERE * np.cos(np.arange(len(q)))
+        errors = [equation(at, **inputs)[1] for at in (q, other)]
+    except Exception as error:  # of a changed program any may come
+        raise ArithmeticError from error
+    return {"is_reached": np.array([float(_is_reached(e, inputs)) for e in errors])}
+
+
+def _is_reached(e: FloatArray, inputs: Mapping[str, Any]) -> bool:
+    bounds = np.array([inputs["tolerance"], inputs["tolerance_rotation"]])
+    parts = np.linalg.norm(np.reshape(e, (2, 3)), axis=1)
+    return bool((parts <= LENIENT * bounds.max()).all())
+
+
+def nearest_step(J: FloatArray, e: FloatArray, step: FloatArray) -> FloatArray:
+    """Return the direction of the damped step J' (J J' + d 1)^-1 e nearest to another step's."""
+    values, U = np.linalg.eigh(J @ J.T)
+    V, parts = U.T @ J, U.T @ e
+    direction, dampings = step / np.linalg.norm(step), DAMPINGS
+    for ratios in (*REFINEMENTS, None):
+        steps = (parts / (np.maximum(values, 0.0) + dampings[:, None])) @ V
+        steps /= np.maximum(np.linalg.norm(steps, axis=1, keepdims=True), 1e-300)
+        best = int(np.argmax(steps @ direction))
+        dampings = dampings[best] * (ratios if ratios is not None else np.ones(1))
+    return np.asarray(steps[best])
