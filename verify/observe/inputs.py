@@ -15,6 +15,7 @@ from ..gaps import difference
 from ..greeting import Greeting
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import solve
+from ..kinematics.robot_models import urdf
 from ..kinematics.textbook import SOLVERS
 from ..mass_spring.problem import all_forces, problem_of
 from .separation import MIN_CASES, Statement
@@ -30,6 +31,18 @@ STRUCTURE = ("parents", "springs", "pinned", "method", "effector", "steps", "ten
 DAMPERS = (None, "none", "global_factor")
 # A solve that a tolerance of LOOSE [m] ends early, and that goes on with other sweeps.
 TIGHT, LOOSE, SWEEPS, FEW_SWEEPS = 1e-6, 0.3, 60, 2
+# The inputs of robots that change all right answers, and the requests and frames that show them.
+ROBOT_INPUTS = {
+    "robot_jacobian": ("origins", "orientations", "axes", "tool_position", "q"),
+    "robot_velocity": ("origins", "orientations", "axes", "tool_position", "q",
+                       "linear_velocity", "angular_velocity"),
+    "robot_inverse_kinematics": ("origins", "orientations", "axes", "tool_position",
+                                 "tool_rotation", "target_position", "target_rotation"),
+    "robot_track": ("origins", "orientations", "axes", "tool_position", "tool_rotation",
+                    "target_positions", "target_rotations"),
+}  # fmt: skip
+ROBOT_FAMILIES, FRAMES = ("any configuration", "any pose", "near start", "curve"), 3
+DIRECTIONS = ("rotation", "rotations", "orientations", "axes")
 # What a program may say of a solve by an input that does not change the pose.
 CLAIMS = {"residual", "iterations", "converged"}
 
@@ -76,28 +89,41 @@ def _telling(cases: Sequence[Case]) -> list[Case]:
         ]
         easy += [case for case in cases if case.family.startswith("one sweep")]
         return [replace(case, inputs={**case.inputs, **whole}) for case in easy[:REQUESTS]]
+    if cases[0].task in ROBOT_INPUTS:
+        suitable = [c for c in cases if c.family in ROBOT_FAMILIES and "rotated frames" in c.name]
+        return [_shortened(case) for case in suitable[:REQUESTS]]
     families = ("three joints", "several springs", "gravity", "pins", "random", "dampers")
     suitable = [case for case in cases if case.family in families]
     return sorted(suitable, key=lambda case: -case.size)[:REQUESTS]
+
+
+def _shortened(case: Case) -> Case:
+    """Return a motion's first frames, or another request as it is."""
+    frames = {name: value[:FRAMES] for name, value in case.inputs.items()
+              if name.startswith("target") and case.task == "robot_track"}  # fmt: skip
+    return replace(case, inputs={**case.inputs, **frames})
 
 
 def _changes(case: Case, greeting: Greeting) -> Iterator[tuple[str, dict[str, Any]]]:
     """Yield an input that is not a constant of the solver, and the inputs with another value."""
     rng = np.random.default_rng(3)
     for name, value in case.inputs.items():
+        if case.task in ROBOT_INPUTS and name not in ROBOT_INPUTS[case.task]:
+            continue
         if name in STRUCTURE or _is_optional(name, case, greeting) or not _is_telling(name, value):
             continue
         if name == "max_iterations":
             new: Any = FEW_SWEEPS
         elif name == "tolerance":
             new = LOOSE
-        elif name.endswith("rotations"):
+        elif name.endswith(DIRECTIONS):
             new = np.array(value) + 0.2 * rng.standard_normal(np.shape(value))
             new /= np.linalg.norm(new, axis=-1, keepdims=True)
         else:  # one factor for all, which solvers of one mass or stiffness take
             new = np.asarray(value) * rng.uniform(1.05, 1.3)
             new = float(new) if np.ndim(value) == 0 else new
-        yield name, {**case.inputs, name: new}
+        changed = {**case.inputs, name: new}
+        yield name, changed | {"urdf": urdf(changed)} if "urdf" in changed else changed
 
 
 def _is_optional(name: str, case: Case, greeting: Greeting) -> bool:

@@ -18,12 +18,13 @@ from ..kinematics import forward_kinematics, problems
 from ..mass_spring import forces
 from ..mass_spring.cases import telling_cases as spring_cases
 from . import inputs
+from . import robots
 from .joints import forward_evidence, inverse_evidence, sound_cases
 from .separation import ElementTable, Findings, Statement, joined, separation
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
-TASKS = (forward_kinematics.TASK, problems.TASK, forces.TASK, STEP)
+TASKS = (forward_kinematics.TASK, problems.TASK, forces.TASK, STEP, *robots.TASKS)
 # Fewer cases let chance speak: of 5 random cases 27 % of the statements were false on all cases.
 MIN_ANSWERS = 14
 # The most sentences before the one about what is right, and the most quantities in that.
@@ -65,7 +66,7 @@ def _telling_cases(report: TaskReport, greeting: Greeting, seed: int) -> list[Ca
     if report.task in (forward_kinematics.TASK, problems.TASK):
         module = forward_kinematics if report.task == forward_kinematics.TASK else problems
         return module.telling_cases(greeting, report.method, seed)
-    return spring_cases(report.task, greeting, seed)
+    return [] if report.task in robots.TASKS else spring_cases(report.task, greeting, seed)
 
 
 def _ask(contestant: Contestant, cases: Sequence[Case], method: str) -> list[CaseJudgement]:
@@ -129,6 +130,8 @@ def _evidence(
     """Return what the answers to a task show; `epsilon` is their precision."""
     if report.task == forward_kinematics.TASK:
         return forward_evidence(judgements)
+    if report.task in robots.TASKS:
+        return robots.robot_evidence(report.task, judgements)
     if report.task == problems.TASK:
         return inverse_evidence(report, judgements, {*unread})
     return spring_evidence(judgements, epsilon, sound_cases(judgements))

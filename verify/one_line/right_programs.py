@@ -25,6 +25,8 @@ FAULTS = _TABLE["line"]
 BY_LINES = {*FAULTS, *_TABLE["known"]}
 # Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
+# The tasks whose known faults the programs of a task may have; steps are those of all robots' tasks.
+FOUNDATIONS = BUILDS_ON | {tool_steps.TASK: (*BUILDS_ON["robot_track"], "robot_track")}
 # The declaration of programs of Jacobian methods.
 JACOBIAN = '"methods": ["jacobian"]'
 # Faults of these families are named in other ways than by the lines of a program.
@@ -37,7 +39,7 @@ def faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
         fault
         for fault in coded_faults().values()
         if fault.family not in SELF_NAMED
-        and (fault.task in BUILDS_ON.get(task, ()) or _is_shared(fault, task, method))
+        and (fault.task in FOUNDATIONS.get(task, ()) or _is_shared(fault, task, method))
         and fault.lines
         and all(source.count(right) == 1 for right, _ in fault.lines)
     ]
