@@ -1,4 +1,4 @@
-"""Robots with limits: right solvers pass, wrong ones are told by a law and named by their fault."""
+"""Robots with limits: right solvers pass, wrong ones break a law."""
 
 from dataclasses import replace
 from functools import cache
@@ -16,16 +16,13 @@ from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import robot_models, robot_targets
-from plumbob.verify.kinematics.robot_faults import FAULTS
 from plumbob.verify.kinematics.robot_inverse_kinematics import (
     TASK,
     judge,
     solve_by_reference,
 )
 from plumbob.verify.kinematics.robot_models import tool_pose
-from plumbob.verify.kinematics.robot_readings import RIGHT
 from plumbob.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE
-from plumbob.verify.kinematics.robot_textbook import UNROTATED, rotation_error
 from plumbob.verify.verify import judge_cases
 
 GREETING = Greeting(PROTOCOL, (TASK,), name="robots")
@@ -49,22 +46,6 @@ def near_cases():
     return [case for case in all_cases() if case.family in (robot_targets.AT, CLOSE)]
 
 
-def misled(case, key):
-    """The case with a target that a solver with this fault believes to have reached."""
-    inputs, fault = dict(case.inputs), FAULTS[key]
-    q = 0.7 * inputs["upper"] + 0.2 - 0.1 * np.arange(len(inputs["upper"]))
-    q = np.clip(q, inputs["lower"], inputs["upper"])
-    frames = fault.frames({**inputs, "target_rotation": np.eye(4)[0]}, q)
-    target = rotation.from_matrix(frames.rotation)
-    if key in ("scalar last", "every scalar last"):
-        target = np.roll(target, -1)
-    elif key in ("inverse rotations", "inverse target"):
-        target = rotation.conjugate(target)
-    inputs |= {"target_position": frames.position, "target_rotation": target}
-    answer = Answer({"q": q}, 0.0)
-    return Exchange(replace(case, inputs=inputs), answer, answer)
-
-
 def judged(function, cases=None):
     cases = few_cases() if cases is None else cases
     return judge_cases(FunctionContestant({TASK: function}, GREETING), TASK, "", cases)
@@ -81,28 +62,6 @@ def test_a_right_solver_is_right_or_stuck_somewhere():
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert broken(report) == set()
     assert len(report.judgements) == len(cases) > 6
-
-
-# Whose matrices are no rotations, or who leaves rotations out, single iterations show; who takes
-# chains only is judged on them; one robot has a slide in a rotated frame, which Jacobians show;
-# targets half a turn off show branches.
-ELSEWHERE = (
-    "parents ignored", "effector ignored", "slides not rotated", "slides not rotated 2",
-    "position only", "slides along z", "slides along z 2",
-    "joints along the chain", *(key for key in FAULTS if key.startswith("branch of")),
-)  # fmt: skip
-KEYS = [
-    key for key, one in FAULTS.items()
-    if not (UNROTATED & one.rules.keys() or key in ELSEWHERE)
-]  # fmt: skip
-
-
-@pytest.mark.sample("tool's rotation on the left")
-@pytest.mark.parametrize("key", KEYS)
-def test_a_fault_breaks_a_law_and_is_named(key):
-    report = explained(TASK, [misled(case, key) for case in near_cases()], GREETING)
-    assert broken(report) & {"target reached", "rotation reached"}
-    assert [one.faults for one in report.diagnosis.explanations] == [(key,)]
 
 
 @pytest.mark.parametrize(("turns", "is_wrapped"), [(1, True), (-2, True), (0.3, False)])
@@ -161,34 +120,12 @@ def test_kinematics_are_those_of_the_same_text_by_the_reference_and_by_mujoco(nu
     np.testing.assert_allclose(theirs.matrices[0], matrix, atol=1e-12)
 
 
-@pytest.mark.parametrize("number", range(0, 40, 5))
-def test_kinematics_of_the_textbook_without_faults_are_those_of_the_reference(number):
-    """Central differences of 1e-6 are wrong by 1e-10, and rounding adds 1e-10."""
-    case = all_cases()[number]
-    inputs = case.inputs
-    q = np.random.default_rng(4).uniform(inputs["lower"], inputs["upper"])
-    frames, pose = RIGHT.frames(inputs, q), tool_pose(inputs, q)
-    np.testing.assert_allclose(frames.position, pose.positions, atol=1e-12)
-    np.testing.assert_allclose(frames.rotation, rotation.to_matrix(pose.rotations), atol=1e-12)
-    (J,) = RIGHT.jacobians(inputs, q)
-    expected = jacobians.jacobian(robot_models.mechanism(inputs), q, -1)
-    np.testing.assert_allclose(J, expected, atol=1e-12)
-    moved = RIGHT.frames(inputs, q + 1e-6).rotation
-    turned = rotation_error(frames.rotation, moved)
-    np.testing.assert_allclose(turned, 1e-6 * expected[3:].sum(axis=1), atol=1e-9)
-
-
 def exchange_of(case, q, **claims):
     answer = Answer({"q": q, **claims}, 0.0)
     return Exchange(case, answer, answer)
 
 
-def named(exchanges):
-    report = explained(TASK, exchanges, GREETING)
-    return report.verdict, [one.faults[0] for one in report.diagnosis.explanations]
-
-
-def test_limits_that_are_kept_only_after_the_solve_are_named():
+def test_limits_that_are_kept_only_after_the_solve_break_a_law():
     limited = [case for case in all_cases() if case.family == AT_A_LIMIT]
     exchanges = []
     for case in limited[:4]:
@@ -201,22 +138,7 @@ def test_limits_that_are_kept_only_after_the_solve_are_named():
         assert is_reached
         laws = judge([exchange_of(case, right)], GREETING, "")
         assert broken(laws) == set()
-    assert named(exchanges) == (Verdict.WRONG, ["clamped after the solve"])
-
-
-def test_angles_from_zero_to_two_pi_are_named():
-    near = [case for case in few_cases() if case.family == robot_targets.AT]
-    exchanges = [exchange_of(case, case.inputs["start"] % (2.0 * np.pi)) for case in near]
-    assert named(exchanges) == (Verdict.WRONG, ["angles from zero"])
-
-
-@pytest.mark.parametrize(
-    ("key", "limit"), [("limits mirrored", -2.4), ("limits of half a turn", np.pi)]
-)
-def test_other_limits_than_the_request_s_are_named(key, limit):
-    near = [case for case in few_cases() if case.family == CLOSE]
-    exchanges = [exchange_of(case, np.full_like(case.inputs["start"], limit)) for case in near]
-    assert named(exchanges) == (Verdict.WRONG, [key])
+    assert "limits in the solve" in broken(judge(exchanges, GREETING, ""))
 
 
 @pytest.mark.slow

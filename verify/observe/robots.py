@@ -95,10 +95,10 @@ def _reached_parts(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
 Reading = Callable[[Mapping[str, Any], FloatArray], FloatArray]
 # How coordinates may be meant.
 READINGS: Sequence[tuple[Sentence, Reading]] = (
-    (sentence("in degrees"), lambda robot, q: np.where(robot["slides"], q, np.radians(q))),
+    (sentence("degrees"), lambda robot, q: np.where(robot["slides"], q, np.radians(q))),
     (sentence("changes from the start"), lambda robot, q: robot["start"] + q),
-    (sentence("in the reverse order of joints"), lambda robot, q: q[..., ::-1]),
-    (sentence("of the opposite sense"), lambda robot, q: np.where(robot["slides"], q, -q)),
+    (sentence("those of the joints in reverse order"), lambda robot, q: q[..., ::-1]),
+    (sentence("angles of the opposite sense"), lambda robot, q: np.where(robot["slides"], q, -q)),
 )
 
 
