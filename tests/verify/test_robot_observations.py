@@ -31,9 +31,7 @@ def cases(task):
 
 
 def observed(task, outputs_of, chosen):
-    judgements = [
-        CaseJudgement(case, Answer(outputs_of(case), 0.0), ()) for case in chosen
-    ]
+    judgements = [CaseJudgement(case, Answer(outputs_of(case), 0.0), (), {}) for case in chosen]
     return " ".join(str(s.sentence) for s in robot_evidence(task, judgements).statements)
 
 
@@ -82,7 +80,10 @@ def test_nothing_is_said_of_right_poses():
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        (lambda case: np.where(case.inputs["slides"], 1.0, 180.0 / np.pi) * solved(case), "degrees"),
+        (
+            lambda case: np.where(case.inputs["slides"], 1.0, 180.0 / np.pi) * solved(case),
+            "degrees",
+        ),
         (lambda case: solved(case) - case.inputs["start"], "changes from the start"),
         (lambda case: solved(case)[::-1], "reverse order"),
         (lambda case: np.where(case.inputs["slides"], 1.0, -1.0) * solved(case), "opposite sense"),
@@ -100,9 +101,7 @@ def test_another_reading_of_coordinates_that_reaches_the_targets_is_said(answer,
 )  # fmt: skip
 def test_the_factor_of_errors_in_a_single_iteration_is_measured(factors, words):
     steps = [case for case in poses() if case.family == robot_targets.STEP]
-    text = observed(
-        POSE, lambda case: {"q": case.inputs["start"] + stepped(case, *factors)}, steps
-    )
+    text = observed(POSE, lambda case: {"q": case.inputs["start"] + stepped(case, *factors)}, steps)
     assert words in text
 
 
@@ -114,16 +113,18 @@ def test_a_part_of_the_target_that_is_missed_is_counted():
         tilted = Pose(tool.positions, case.inputs["tool_rotation"])
         return robot_models.solved(case.inputs, solved(case), tilted)[0]
 
-    positions = [np.linalg.norm(robot_models.tool_pose(case.inputs, off(case)).positions
-                                - case.inputs["target_position"]) < 1e-6 for case in near]  # fmt: skip
-    reached = [case for case, is_at in zip(near, positions, strict=True) if is_at]
+    def is_at(case):
+        tool = robot_models.tool_pose(case.inputs, off(case))
+        return np.linalg.norm(tool.positions - case.inputs["target_position"]) < 1e-6
+
+    reached = list(filter(is_at, near))
     text = observed(POSE, lambda case: {"q": off(case)}, reached)
     assert len(reached) < 6 or f"the position of {len(reached)}" in text
 
 
 def test_a_joint_that_never_moves_is_named_by_its_place():
     def stiff(case):
-        q = solved(case)
+        q = np.array(solved(case))
         q[0] = case.inputs["start"][0]
         return q
 

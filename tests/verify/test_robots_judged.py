@@ -1,6 +1,5 @@
 """Robots with limits: right solvers pass, wrong ones break a law."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -8,7 +7,7 @@ import pytest
 from kinematics_solvers import explained
 
 from plumbob.crosscheck.engines import MujocoRobot
-from plumbob.reference import forward_kinematics, jacobians, rotation
+from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import urdf
 from plumbob.reference.skeleton import Pose
 from plumbob.verify.contestant import Answer, Exchange

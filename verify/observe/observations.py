@@ -17,8 +17,7 @@ from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics import forward_kinematics, problems
 from ..mass_spring import forces
 from ..mass_spring.cases import telling_cases as spring_cases
-from . import inputs
-from . import robots
+from . import inputs, robots
 from .joints import forward_evidence, inverse_evidence, sound_cases
 from .separation import ElementTable, Findings, Statement, joined, separation
 from .springs import spring_evidence

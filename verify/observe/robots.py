@@ -74,6 +74,10 @@ def _parts_reached(motion: Trajectory, q: FloatArray) -> BoolArray:
     return np.asarray(is_reached[motion.case.facts["reachable"]])
 
 
+def _count_reached(motion: Trajectory, q: FloatArray) -> int:
+    return int(np.sum(_parts_reached(motion, q).all(axis=1)))
+
+
 # ---- poses and motions
 
 
@@ -105,11 +109,11 @@ READINGS: Sequence[tuple[Sentence, Reading]] = (
 def _readings(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield how coordinates are meant if only so the tool is on its targets."""
     solves = [motion for motion in motions if _is_solve(motion)]
-    before = [_parts_reached(motion, motion.q).all(axis=1) for motion in solves]
-    count = sum(map(len, before))
+    before = [_count_reached(motion, motion.q) for motion in solves]
+    count = sum(int(motion.case.facts["reachable"].sum()) for motion in solves)
     for words, read in READINGS:
-        after = [_parts_reached(m, read(m.inputs, m.q)).all(axis=1) for m in solves]
-        hits, others = (int(sum(part.sum() for part in parts)) for parts in (after, before))
+        after = [_count_reached(motion, read(motion.inputs, motion.q)) for motion in solves]
+        hits, others = sum(after), sum(before)
         if count >= MIN_COUNT and hits >= NEARLY_ALL * count and others <= FEW * count:
             yield sentence(
                 "Taken as {reading}, your coordinates bring the tool to {hits} of {count} "
@@ -122,7 +126,7 @@ def _limits(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield which limits are left, if those of one side, or of one joint, are kept by all."""
     names = ("lower", "upper")
     sides = [
-        (motion.inputs["lower"] - motion.q > AT_LIMIT, motion.q - motion.inputs["upper"] > AT_LIMIT)
+        np.array([motion.inputs["lower"] - motion.q, motion.q - motion.inputs["upper"]]) > AT_LIMIT
         for motion in motions
     ]
     counts = [sum(int(side[k].any(axis=-1).sum()) for side in sides) for k in range(2)]
@@ -154,7 +158,7 @@ def _still_joints(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     for words, has_role in ROLES:
         count, is_still = 0, True
         for motion in motions:
-            moves = (np.abs(motion.changes) > EXACT).any(axis=0)
+            moves = np.asarray((np.abs(motion.changes) > EXACT).any(axis=0))
             joints = has_role(motion.inputs) & (ancestors(motion.inputs) > 0.0)
             if moves[~joints].any() and joints.any():
                 count += 1
@@ -235,6 +239,7 @@ def _single_iterations(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield what single iterations make of errors, of robots that can move freely."""
     steps = [m for m in motions if m.inputs["max_iterations"] == 1 and m.q.shape[1] >= MIN_COUNT]
     moves, errors, frames = list[FloatArray](), list[FloatArray](), list[FloatArray]()
+    cosines = list[float]()
     for motion in steps:
         is_free = ~motion.at_limits.any(axis=1) & (np.abs(motion.changes).max(axis=1) > EXACT)
         if is_free.any():
@@ -243,8 +248,20 @@ def _single_iterations(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
             errors.append(motion.twists(motion.previous)[is_free])
             tool = tool_pose(motion.inputs, motion.previous[is_free])
             frames.append(rotation.to_matrix(tool.rotations))
+            gradients = np.einsum("fij,fi->fj", J, errors[-1])
+            cosines += _cosines(gradients, motion.changes[is_free])
     if moves:
-        yield from _factors(*map(np.concatenate, (moves, errors, frames)), _STEP)
+        parts = np.concatenate(moves), np.concatenate(errors), np.concatenate(frames)
+        yield from _factors(*parts, _STEP)
+    if len(cosines) >= MIN_COUNT and min(cosines) > 1.0 - SAME_ENTRY:
+        yield sentence("Single iterations go along J' e, the gradient, in all {count} cases.",
+                       count=len(cosines))  # fmt: skip
+
+
+def _cosines(first: FloatArray, second: FloatArray) -> list[float]:
+    """Return the cosines of the angles between vectors, (row)."""
+    lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
+    return list(((first * second).sum(axis=1) / np.maximum(lengths, 1e-300)).tolist())
 
 
 def _tool_velocities(
@@ -286,6 +303,7 @@ def _factors(
             arrays = (frames, twist) if number else (twist,)
             seen = np.einsum(subscripts, *arrays)
             factor = float((seen * move).sum() / max((seen * seen).sum(), 1e-300))
+            factor *= abs(factor) > SAME_ENTRY
             gap = np.linalg.norm(move - factor * seen)
             is_right = number == 0 and abs(factor - 1.0) <= NEAR_ONE
             if gap <= REMAINDER * max(np.linalg.norm(move), REMAINDER * np.linalg.norm(seen)):
@@ -324,7 +342,7 @@ def _parts_of_jacobians(judgements: Sequence[CaseJudgement]) -> Iterator[Sentenc
         groups = [(words, has_parts(*np.array(flags, dtype=bool))) for words, has_parts in GROUPS]
         factors = [float((answer * right)[group].sum() / max((right[group] ** 2).sum(), 1e-300))
                    for _, group in groups[:3]]  # fmt: skip
-        scale = sum(f * group for f, (_, group) in zip(factors, groups, strict=False))
+        scale = np.sum([f * group for f, (_, group) in zip(factors, groups, strict=False)], axis=0)
         if (np.abs(answer - scale[:, None] * right).max(axis=-1) <= bound).all():
             yield sentence(
                 "Your numbers are the right ones times a factor: {linear:.6g} in the linear parts "

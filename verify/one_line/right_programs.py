@@ -25,7 +25,7 @@ FAULTS = _TABLE["line"]
 BY_LINES = {*FAULTS, *_TABLE["known"]}
 # Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
-# The tasks whose known faults the programs of a task may have; steps are those of all robots' tasks.
+# The tasks whose known faults programs of a task may have; those of steps have all of robots.
 FOUNDATIONS = BUILDS_ON | {tool_steps.TASK: (*BUILDS_ON["robot_track"], "robot_track")}
 # The declaration of programs of Jacobian methods.
 JACOBIAN = '"methods": ["jacobian"]'

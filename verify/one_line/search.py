@@ -95,9 +95,7 @@ def with_changed_line(
             proposals = None  # without a dictionary all lines are searched
     explanations = tuple[Explanation, ...]()
     for view in (*tool_steps.views(report), report) if not doubtful else (report,):
-        explanations = explanations or changed_lines(
-            view, greeting, doubtful, is_known, proposals
-        )
+        explanations = explanations or changed_lines(view, greeting, doubtful, is_known, proposals)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -188,6 +186,7 @@ def changed_lines(
     if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
     most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
+    most = tool_steps.MAX_MUTANTS if report.task == tool_steps.TASK else most
     for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()

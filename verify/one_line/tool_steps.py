@@ -37,6 +37,8 @@ ELSEWHERE = 0.3
 # Squared dampings [m^2], and the ratios by which the best one is refined twice.
 DAMPINGS = np.geomspace(1e-9, 1e4, 53)
 REFINEMENTS = (np.geomspace(0.57, 1.77, 25), np.geomspace(0.95, 1.05, 25))
+# No further form is changed after so many changes, of a millisecond each.
+MAX_MUTANTS = 3_000
 # Of a motion this many frames, spread evenly, tell enough.
 MAX_FRAMES = 3
 
@@ -121,7 +123,8 @@ def answer_of(program: Program, case: Case) -> Mapping[str, Any]:
     equation = program.names[TASK]
     try:
         if "step" in case.facts:
-            return {"step": nearest_step(*equation(q, **inputs), case.facts["step"])}
+            J, e = equation(q, **inputs)
+            return {"step": nearest_step(J, e, case.facts["step"])}
         other = q + ELSEWHERE * np.cos(np.arange(len(q)))
         errors = [equation(at, **inputs)[1] for at in (q, other)]
     except Exception as error:  # of a changed program any may come

@@ -13,7 +13,8 @@ def robot_inverse_kinematics(start, lower, upper, target_position, target_rotati
         if (np.linalg.norm(error[:3]) <= tolerance
                 and np.linalg.norm(error[3:]) <= tolerance_rotation):
             break
-        J = jacobian(robot, q)
+        x, axes, position, rotation = kinematics(robot, q)
+        J = jacobian(robot, x, axes, position)
         downhill = J.T @ error
         J[:, ((q <= lower) & (downhill < 0.0)) | ((q >= upper) & (downhill > 0.0))] = 0.0
         step = np.linalg.solve(J.T @ J + damping * np.eye(len(q)), J.T @ error)

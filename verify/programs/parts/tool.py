@@ -35,10 +35,9 @@ def error_of(tool, target_position, target_rotation):
     return np.concatenate([target_position - position, vector])
 
 
-def jacobian(robot, q):
+def jacobian(robot, x, axes, position):
     """Return the velocities of the tool, linear and angular, by joint (6, joint)."""
-    x, axes, position, _ = kinematics(robot, q)
-    J, j = np.zeros((6, len(q))), robot["effector"]
+    J, j = np.zeros((6, len(x))), robot["effector"]
     while j >= 0:
         if robot["slides"][j]:
             J[:3, j] = axes[j]
