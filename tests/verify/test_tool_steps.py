@@ -90,7 +90,7 @@ def test_nothing_is_named_in_right_steps(form):
 
 
 @pytest.mark.parametrize(
-    "code", ["PB-ROBOT-004", "PB-ROBOT-005", "PB-ROBOT-031", "PB-ROBOT-055", "PB-ROBOT-060"]
+    "code", ["PB-ROBOT-004", "PB-ROBOT-016", "PB-ROBOT-018", "PB-ROBOT-053", "PB-ROBOT-060"]
 )
 def test_known_faults_are_named_whatever_the_damping_of_the_solver_is(code):
     """The faults are planted in the form that has their lines."""

@@ -93,14 +93,23 @@ def with_changed_line(
             if proposals.hint == UNSTEADY:
                 return report
             proposals = None  # without a dictionary all lines are searched
-    explanations = tuple[Explanation, ...]()
-    for view in (*tool_steps.views(report), report) if not doubtful else (report,):
-        explanations = explanations or changed_lines(view, greeting, doubtful, is_known, proposals)
+    explanations = _of_steps(report, greeting, is_known) or changed_lines(
+        report, greeting, doubtful, is_known, proposals
+    )
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
     return replace(report, diagnosis=diagnosis)
+
+
+def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
+    """Return the change of a line that gives the steps of robots, a known fault before others."""
+    for view in tool_steps.views(report):
+        for known in (True, is_known):
+            if explanations := changed_lines(view, greeting, is_known=known):
+                return explanations
+    return ()
 
 
 def _least_share(report: TaskReport) -> float:
