@@ -122,9 +122,14 @@ def _readings(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
             )  # fmt: skip
 
 
+SIDES = (
+    sentence("{count} answers leave upper limits, and none leaves lower limits."),
+    sentence("{count} answers leave lower limits, and none leaves upper limits."),
+)  # fmt: skip
+
+
 def _limits(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield which limits are left, if those of one side, or of one joint, are kept by all."""
-    names = ("lower", "upper")
     sides = [
         np.array([motion.inputs["lower"] - motion.q, motion.q - motion.inputs["upper"]]) > AT_LIMIT
         for motion in motions
@@ -133,11 +138,7 @@ def _limits(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     if max(counts) < MIN_COUNT:
         return
     if not min(counts):
-        k = int(np.argmin(counts))
-        yield sentence(
-            "{count} answers leave {left} limits; none leaves {kept} limits.",
-            count=max(counts), left=names[1 - k], kept=names[k],
-        )  # fmt: skip
+        yield Sentence(SIDES[int(np.argmin(counts))].template, {"count": max(counts)})
     left = [np.flatnonzero((side[0] | side[1]).any(axis=0)) for side in sides]
     for role, words in ((0, sentence("the first joint")), (-1, sentence("the last joint"))):
         joints = [role % motion.q.shape[1] for motion in motions]
@@ -285,11 +286,14 @@ def _tool_velocities(
 
 PARTS = (sentence("linear part"), sentence("angular part"))
 # Where an error or a velocity is seen: as it is, along the tool's axes, rotated once too often.
-AXES: Sequence[tuple[Sentence, str]] = (
-    (sentence("as it is"), "fi->fi"),
-    (sentence("along the tool's axes"), "fji,fj->fi"),
-    (sentence("as if given along the tool's axes"), "fij,fj->fi"),
-)
+AXES = ("fi->fi", "fji,fj->fi", "fij,fj->fi")
+FACTORS = (
+    sentence("The {part} of {what} is {factor:.3g} times the right one in all {count} cases."),
+    sentence("The {part} of {what} is {factor:.3g} times the right one as seen along the tool's "
+             "axes, in all {count} cases."),
+    sentence("The {part} of {what} is {factor:.3g} times the right one rotated by the tool's "
+             "rotation, in all {count} cases."),
+)  # fmt: skip
 
 
 def _factors(
@@ -299,7 +303,7 @@ def _factors(
     for part, words in enumerate(PARTS if len(moves) >= MIN_COUNT else ()):
         columns = slice(3 * part, 3 * part + 3)
         move, twist = moves[:, columns], twists[:, columns]
-        for number, (axes, subscripts) in enumerate(AXES):
+        for number, subscripts in enumerate(AXES):
             arrays = (frames, twist) if number else (twist,)
             seen = np.einsum(subscripts, *arrays)
             factor = float((seen * move).sum() / max((seen * seen).sum(), 1e-300))
@@ -308,11 +312,8 @@ def _factors(
             is_right = number == 0 and abs(factor - 1.0) <= NEAR_ONE
             if gap <= REMAINDER * max(np.linalg.norm(move), REMAINDER * np.linalg.norm(seen)):
                 if not is_right:
-                    yield sentence(
-                        "The {part} of {what} is {factor:.3g} times what it should be, {axes}, in "
-                        "all {count} cases.",
-                        part=words, what=what, factor=factor, axes=axes, count=len(move),
-                    )  # fmt: skip
+                    values = {"part": words, "what": what, "factor": factor, "count": len(move)}
+                    yield Sentence(FACTORS[number].template, values)
                 break
 
 
