@@ -307,7 +307,7 @@ def _factors(
             arrays = (frames, twist) if number else (twist,)
             seen = np.einsum(subscripts, *arrays)
             factor = float((seen * move).sum() / max((seen * seen).sum(), 1e-300))
-            factor *= abs(factor) > SAME_ENTRY
+            factor = factor if abs(factor) > SAME_ENTRY else 0.0
             gap = np.linalg.norm(move - factor * seen)
             is_right = number == 0 and abs(factor - 1.0) <= NEAR_ONE
             if gap <= REMAINDER * max(np.linalg.norm(move), REMAINDER * np.linalg.norm(seen)):
