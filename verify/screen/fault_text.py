@@ -47,7 +47,7 @@ def _why_unknown(name: str, text: str) -> str:
     code = re.fullmatch(r"PB-([A-Z]+)-(\d{3})", name)
     if code and 0 < int(code[2]) <= FAMILIES.get(code[1], {"last": 0})["last"]:
         return (
-            f"{name} is retired, its mistake shows as a changed line (PB-LINE); "
+            f"{name} is retired, its mistake may show as a changed line (PB-LINE); "
             f"`plumbob explain PB-{code[1]}` lists those with a code of their own"
         )
     near = get_close_matches(name, coded_faults(), n=1)
