@@ -104,11 +104,16 @@ def with_changed_line(
 
 
 def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
-    """Return the change of a line that gives the steps of robots, a known fault before others."""
+    """Return the change of a line that gives the steps of robots, a known fault before others.
+
+    Other lines are changed in the first view alone: single steps show more than where solves end.
+    """
     for view in tool_steps.views(report):
-        for known in (True, is_known):
-            if explanations := changed_lines(view, greeting, is_known=known):
-                return explanations
+        explanations = changed_lines(view, greeting, is_known=True)
+        if not explanations and not is_known:
+            explanations, is_known = changed_lines(view, greeting), True
+        if explanations:
+            return explanations
     return ()
 
 
@@ -178,6 +183,8 @@ def changed_lines(
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
     best, functions = tuple[Explanation, ...](), set[str]()
+    if report.task in tool_steps.SOLVES:
+        compared = compared[: tool_steps.MAX_SOLVES]
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
@@ -191,6 +198,8 @@ def changed_lines(
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
         programs = [] if proposals.is_wrong else programs[:1]
+    if report.task in tool_steps.SOLVES:
+        functions |= {p.text_of(name) for p in programs for name in tool_steps.STEP_FUNCTIONS}
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
     if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
@@ -199,8 +208,9 @@ def changed_lines(
     for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()
+        is_short = report.task != tool_steps.TRACK  # motions take too long for changes of all lines
         explanations = _of_program(
-            program, report, compared, tolerance, None if is_known else functions
+            program, report, compared, tolerance, functions if is_short and not is_known else None
         )
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)

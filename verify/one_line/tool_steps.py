@@ -22,12 +22,16 @@ from ..kinematics.robot_targets import TASK as INVERSE
 from ..laws import finding
 from .mutants import Program
 
+SOLVES = (INVERSE, TRACK)
 # The task of the right programs of J and e, which no solver is asked.
 TASK = "tool_step"
 # Directions of steps agree to this: dampings between those that are tried leave less.
 SAME_STEP = 3e-3
 # Fewer joints than this reach no pose in other kinematics, and any damping fits their steps.
 MIN_JOINTS = 6
+# Functions of solves whose lines steps have tried, and how many whole solves are compared.
+STEP_FUNCTIONS = ("kinematics", "jacobian", "error_of")
+MAX_SOLVES = 6
 # Steps shorter than this are rounding [rad, m], and joints as near to a limit are at the limit.
 SHORTEST = 1e-6
 # A solver has reached what is within so many tolerances: it may have a test of its own.
@@ -39,19 +43,21 @@ DAMPINGS = np.geomspace(1e-9, 1e4, 53)
 REFINEMENTS = (np.geomspace(0.57, 1.77, 25), np.geomspace(0.95, 1.05, 25))
 # No further form is changed after so many changes, of a millisecond each.
 MAX_MUTANTS = 3_000
+# Fewer answers would be met by many changes by chance.
+MIN_VIEW = 3
 # Of a motion this many frames, spread evenly, tell enough.
 MAX_FRAMES = 3
 
 
 def views(report: TaskReport) -> Iterator[TaskReport]:
     """Yield reports on the same answers as single steps, and as coordinates on their targets."""
-    if report.task not in (INVERSE, TRACK):
+    if report.task not in SOLVES:
         return
     poses = [pose for judgement in report.judgements for pose in _poses(judgement)]
     steps = [_as_step(pose) for pose in poses if _is_step(pose)]
     ends = [_as_end(pose) for pose in poses if _is_end(pose)]
     for judgements in (steps, ends):
-        if judgements:
+        if len(judgements) >= MIN_VIEW:
             yield replace(report, task=TASK, judgements=judgements)
 
 
