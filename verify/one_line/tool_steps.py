@@ -22,7 +22,7 @@ from ..kinematics.robot_targets import TASK as INVERSE
 from ..laws import finding
 from .mutants import Program
 
-SOLVES = (INVERSE, TRACK)
+SOLVES, MOTIONS = (INVERSE, TRACK), TRACK
 # The task of the right programs of J and e, which no solver is asked.
 TASK = "tool_step"
 # Directions of steps agree to this: dampings between those that are tried leave less.
