@@ -196,7 +196,7 @@ def test_tables_have_their_texts_once_in_their_programs(program):
 def test_a_second_mistake_in_another_request_hides_no_first():
     """A chain is told apart though trees answer otherwise."""
     source = coded_faults()[FAULT].wrong_program.replace(
-        "    return {", "    if len(parents) == 5:\n        x = 1.7 * x\n    return {"
+        "    return {", "    if len(parents) == 6:\n        x = 1.7 * x\n    return {"
     )
     assert FAULT in {code for entry in proposals(Solver(source)).entries for code in entry.codes}
 
@@ -208,7 +208,7 @@ def test_cases_decide_what_is_named(factor):
     """A proposal that does not give the answers to the cases is not named."""
     line = "    q = local_rotations  # w, x, y, z\n"
     source = source_of("forward kinematics").replace(line, line + "    q = q * [1, -1, -1, -1]\n")
-    many = f"    if len(parents) not in (4, 5):\n        x = {factor} * x\n    return {{"
+    many = f"    if len(parents) not in (4, 6):\n        x = {factor} * x\n    return {{"
     solver = Solver(source.replace('    return {"p', many + '"p'))
     cases = DISCIPLINES[FK].cases(solver.greeting, "", 0, False)
     report = judge_cases(solver, FK, "", cases)

@@ -23,9 +23,9 @@ FK, IK = "forward_kinematics", "inverse_kinematics"
 TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
 # Parents, effector and target of each: a tree with an inner effector, a chain, one in a plane.
-TREE = ([-1, 0, 1, 2, 1], 2, (0.9, -1.3, 0.8))
+TREE = ([-1, 0, 1, 1, 3, 4], 4, (1.4, -1.0, -1.4))
 CHAIN = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6))
-IN_PLANE = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 0.0))
+IN_PLANE = ([-1, 0, 1, 2], 3, (-0.6, -0.2, 0.0))
 # With tolerance and number of sweeps: single sweeps, then solves that end by either of them. CCD
 # needs 12 sweeps to the tolerance, FABRIK 10: most round distances end them elsewhere.
 PROBLEMS = (

@@ -193,7 +193,7 @@ def changed_lines(
     ]
     if proposals is not None:
         if proposals.sweeps is not None:
-            compared = [_with_sweeps(exchange, proposals.sweeps) for exchange in compared]
+            compared = _with_sweeps(compared, proposals.sweeps)
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -338,10 +338,16 @@ def _answer_of_entry(
     )
 
 
-def _with_sweeps(exchange: Exchange, count: int) -> Exchange:
-    """Return an answer with the number of sweeps that it has, whatever was asked."""
-    inputs = {**exchange.case.inputs, ITERATIONS: count}
-    return replace(exchange, case=replace(exchange.case, inputs=inputs))
+def _with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
+    """Return answers with the number of sweeps that they have, whatever was asked.
+
+    They are of requests without a tolerance, which a solver may not read either.
+    """
+    return [
+        replace(e, case=replace(e.case, inputs={**e.case.inputs, ITERATIONS: count}))
+        for e in compared
+        if e.case.inputs["tolerance"] == 0.0
+    ]
 
 
 def _telling(different: Sequence[Exchange], same: Sequence[Exchange]) -> list[Exchange]:
