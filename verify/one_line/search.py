@@ -18,7 +18,7 @@ from ..dictionary.entry import Entry
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..dictionary.requests import TASKS
 from ..explain import MORE, Variant, explain, together
-from ..fault_programs import NOTES, CodedFault, coded_faults, source_of
+from ..fault_programs import IN_DICTIONARY, NOTES, CodedFault, coded_faults, source_of
 from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Explanation, Finding, TaskReport, Verdict
@@ -174,8 +174,8 @@ def changed_lines(
 ) -> tuple[Explanation, ...]:
     """Return the change of a line that gives most wrong or doubtful answers, () if too few.
 
-    If `is_known`, the search is for known faults alone. Programs with a dictionary are changed as
-    it proposes, the others in all lines.
+    If `is_known`, the search is for known faults alone. Where a dictionary proposes changes, these
+    are tried; the lines of its first program, if answers to all its requests are right.
     """
     compared = _compared(report, doubtful)
     if not compared:
@@ -197,7 +197,8 @@ def changed_lines(
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
-        programs = [] if proposals.is_wrong else programs[:1]
+        first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
+        programs = [p for p in programs if p.source in first and not proposals.is_wrong]
     if report.task in tool_steps.SOLVES:
         functions |= {p.text_of(name) for p in programs for name in tool_steps.STEP_FUNCTIONS}
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
