@@ -209,7 +209,9 @@ def changed_lines(
     for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()
-        is_short = report.task != tool_steps.MOTIONS  # motions take too long for changes of all lines
+        is_short = (
+            report.task != tool_steps.MOTIONS
+        )  # motions take too long for changes of all lines
         explanations = _of_program(
             program, report, compared, tolerance, functions if is_short and not is_known else None
         )
