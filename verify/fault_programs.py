@@ -8,7 +8,7 @@ wrong one.
 import ast
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import chain, product
 from pathlib import Path
@@ -57,16 +57,20 @@ def changes_of(program: str) -> Iterator[TextChange]:
     """Yield the wrong programs of a right program's tables: each combination of their texts."""
     source = source_of(program)
     for table in (table for table in _TABLE["tables"] if program in table["programs"]):
-        right, *names = table["lines"][0], *table["texts"]
         for texts in product(*table["texts"].values()):
-            wrong, shown = table["lines"][1], table["shown"][1]
-            for name, text in zip(names, texts, strict=True):
-                wrong = wrong.replace(f"<{name}>", text)
-                shown = shown.replace(f"<{name}>", text)
-            yield TextChange(
-                table["kind"], source.replace(right, wrong), table["function"],
-                table["shown"][0], shown,
-            )  # fmt: skip
+            wrong = source
+            for right, text in table["lines"]:
+                wrong = wrong.replace(right, _filled(text, table["texts"], texts))
+            shown = _filled(table["shown"][1], table["texts"], texts)
+            right = table["shown"][0]
+            yield TextChange(table["kind"], wrong, table["function"], right, shown)
+
+
+def _filled(text: str, names: Iterable[str], texts: Sequence[str]) -> str:
+    """Return a text with others in the place of their names; these may hold later names."""
+    for name, part in zip(names, texts, strict=True):
+        text = text.replace(f"<{name}>", part)
+    return text
 
 
 class CodedFault(NamedTuple):

@@ -14,7 +14,7 @@ from ..one_line.right_programs import answer_of, comparable
 from .entry import Dictionary, Entry, likelihood
 
 # The most sweeps that are tried: most constants are smaller, or enough for poses to stay.
-MAX_SWEEPS = 60
+MAX_SWEEPS = 30
 # The passes through loops that a sweep of a small skeleton needs, and more.
 PASSES = 100
 # Poses that a further sweep changes by less stay.
@@ -29,6 +29,7 @@ def makes_constant_sweeps(cases: Sequence[Case], answers: Sequence[Answer | Fail
     return any(
         np.array_equal(other.inputs["target"], case.inputs["target"])
         and isinstance(answer, Answer)
+        and not np.allclose(answer.values["local_rotations"], case.inputs["local_rotations"])
         and isinstance(other_answer, Answer)
         and difference(answer.values, other_answer.values) <= SAME
         for other, other_answer in zip(cases[1:], answers[1:], strict=True)

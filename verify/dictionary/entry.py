@@ -33,9 +33,11 @@ class Entry(NamedTuple):
 
         The function has the passes of `Program` in its loops: it was written by one.
         """
-        source = source_of(self.program)
+        source, faults = source_of(self.program), coded_faults()
         for code in self.codes:
-            source = coded_faults()[code].planted_in(source)
+            if code not in faults:
+                raise ValueError(f"{code}: expected a known fault: is the dictionary out of date?")
+            source = faults[code].planted_in(source)
         program = Program(source)
         if self.text:
             exec(compile(self.text, self.program, "exec"), program.names)

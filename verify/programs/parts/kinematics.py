@@ -9,8 +9,8 @@ def kinematics(parents, offsets, q):
     x, R = offsets.copy(), q.copy()
     for j in range(1, len(parents)):
         p = parents[j]
-        x[j] = x[p] + rotate(R[p], offsets[j])
         R[j] = multiply(R[p], q[j])
+        x[j] = x[p] + rotate(R[p], offsets[j])
     return x, R
 
 
