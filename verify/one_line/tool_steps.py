@@ -111,18 +111,18 @@ def _as_step(pose: CaseJudgement) -> CaseJudgement:
 
 
 def _as_end(pose: CaseJudgement) -> CaseJudgement:
-    """Return an answer as coordinates at which a solver is on its target, and not elsewhere."""
+    """Return an answer as coordinates at which a solver is on its target, and off it elsewhere."""
     assert isinstance(pose.answer, Answer)
     inputs = {**pose.case.inputs, "q": pose.answer.values["q"]}
     case = replace(pose.case, task=TASK, inputs=inputs, facts={})
-    return replace(pose, case=case, answer=Answer({"is_reached": np.array([1.0, 0.0])}, 0.0))
+    return replace(pose, case=case, answer=Answer({"is_reached": np.ones(2)}, 0.0))
 
 
 def answer_of(program: Program, case: Case) -> Mapping[str, Any]:
     """Return what the equations of a program make of an answer; raise ArithmeticError if nothing.
 
     These are the step along its equations that is nearest to the answer's, or whether it is on its
-    target at the answer and elsewhere.
+    target at the answer, and off it in both parts elsewhere.
     """
     inputs = dict(case.inputs)
     q = inputs.pop("q")
@@ -135,13 +135,10 @@ def answer_of(program: Program, case: Case) -> Mapping[str, Any]:
         errors = [equation(at, **inputs)[1] for at in (q, other)]
     except Exception as error:  # of a changed program any may come
         raise ArithmeticError from error
-    return {"is_reached": np.array([float(_is_reached(e, inputs)) for e in errors])}
-
-
-def _is_reached(e: FloatArray, inputs: Mapping[str, Any]) -> bool:
-    bounds = np.array([inputs["tolerance"], inputs["tolerance_rotation"]])
-    parts = np.linalg.norm(np.reshape(e, (2, 3)), axis=1)
-    return bool((parts <= LENIENT * bounds.max()).all())
+    bound = LENIENT * max(inputs["tolerance"], inputs["tolerance_rotation"])
+    here, there = (np.linalg.norm(np.reshape(e, (2, 3)), axis=1) <= bound for e in errors)
+    # who leaves a part of the error out is at its target wherever that part leads
+    return {"is_reached": np.array([here.all(), ~there.any()], dtype=float)}
 
 
 def nearest_step(J: FloatArray, e: FloatArray, step: FloatArray) -> FloatArray:
