@@ -200,12 +200,12 @@ def changed_lines(
         first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
         programs = [p for p in programs if p.source in first and not proposals.is_wrong]
     if report.task in tool_steps.SOLVES:
-        functions |= {p.text_of(name) for p in programs for name in tool_steps.STEP_FUNCTIONS}
+        functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
     if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
     most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
-    most = tool_steps.MAX_MUTANTS if report.task == tool_steps.TASK else most
+    most = tool_steps.MAX_MUTANTS.get(report.task, most)
     for program in () if best else programs:
         if report.task in IN_CONVENTIONS:
             functions.clear()

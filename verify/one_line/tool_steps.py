@@ -30,7 +30,7 @@ SAME_STEP = 3e-3
 # Fewer joints than this reach no pose in other kinematics, and any damping fits their steps.
 MIN_JOINTS = 6
 # Functions of solves whose lines steps have tried, and how many whole solves are compared.
-STEP_FUNCTIONS = ("kinematics", "jacobian", "error_of")
+FUNCTIONS = {"kinematics", "jacobian", "error_of"}
 MAX_SOLVES = 6
 # Steps shorter than this are rounding [rad, m], and joints as near to a limit are at the limit.
 SHORTEST = 1e-6
@@ -41,8 +41,8 @@ ELSEWHERE = 0.3
 # Squared dampings [m^2], and the ratios by which the best one is refined twice.
 DAMPINGS = np.geomspace(1e-9, 1e4, 53)
 REFINEMENTS = (np.geomspace(0.57, 1.77, 25), np.geomspace(0.95, 1.05, 25))
-# No further form is changed after so many changes, of a millisecond each.
-MAX_MUTANTS = 3_000
+# No further program is changed after so many changes, by task: those of steps take a millisecond.
+MAX_MUTANTS = {TASK: 3_000, "robot_jacobian": 14_000, "robot_velocity": 14_000}
 # Fewer answers would be met by many changes by chance.
 MIN_VIEW = 3
 # Of a motion this many frames, spread evenly, tell enough.
