@@ -108,13 +108,11 @@ def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[E
 
     Other lines are changed in the first view alone: single steps show more than where solves end.
     """
-    for view in tool_steps.views(report):
-        explanations = changed_lines(view, greeting, is_known=True)
-        if not explanations and not is_known:
-            explanations, is_known = changed_lines(view, greeting), True
-        if explanations:
+    views = list(tool_steps.views(report))
+    for view in (report, *views) if views else ():
+        if explanations := changed_lines(view, greeting, is_known=True):
             return explanations
-    return ()
+    return () if is_known or not views else changed_lines(views[0], greeting)
 
 
 def _least_share(report: TaskReport) -> float:
