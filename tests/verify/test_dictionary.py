@@ -22,7 +22,7 @@ from plumbob.verify.dictionary.requests import (
 )
 from plumbob.verify.fault_programs import IN_DICTIONARY, changes_of, coded_faults, source_of
 from plumbob.verify.functions import FunctionContestant
-from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting
+from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.one_line.right_programs import answer_of
@@ -177,12 +177,13 @@ def test_frames_are_proposed():
     assert changes[0].wrong in {entry.wrong for entry in result.entries}
 
 
-def test_each_known_fault_is_proposed_once_where_sweeps_are_constant():
-    result = ccd_proposals(source_of("ccd"), fixed=Fixed(max_iterations=20))
-    codes = [entry.codes for entry in result.entries]
-    assert result.is_wrong
-    assert {len(each) for each in codes} == {1}
-    assert len(codes) == len(set(codes)) <= module.MAX_CANDIDATES
+@pytest.mark.parametrize(("code", "codes"), [("PB-CCD-001", [("PB-CCD-001",)]), (None, [])])
+def test_a_known_fault_is_found_where_sweeps_are_constant(code, codes):
+    source = coded_faults()[code].wrong_program if code else source_of("ccd")
+    line = "    q = local_rotations.copy()\n"
+    result = ccd_proposals(source.replace(line, "    max_iterations, tolerance = 12, 0.0\n" + line))
+    assert [entry.codes for entry in result.entries] == codes
+    assert (result.sweeps, result.is_wrong) == (12, True)
 
 
 @pytest.mark.parametrize("program", [name for names in IN_DICTIONARY.values() for name in names])

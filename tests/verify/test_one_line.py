@@ -42,7 +42,8 @@ def changed_lines(source, task):
 
 
 # Several texts are changed at once by tables, which a dictionary has and no search.
-TABLED = {change.kind for name in PROGRAMS for change in changes_of(name)} - {"condition"}
+TABLED = {change.kind for name in PROGRAMS for change in changes_of(name)}
+TABLED -= {"condition", "reading"}
 LINES = {
     fault.name: fault
     for fault in coded_faults().values()

@@ -36,23 +36,22 @@ def makes_constant_sweeps(cases: Sequence[Case], answers: Sequence[Answer | Fail
     )
 
 
-def known_faults(
+def known_fault(
     base: Program, dictionaries: Iterable[Dictionary], method: str, case: Case, answer: Answer,
     tolerance: float,
 ) -> tuple[list[Entry], int | None]:  # fmt: skip
-    """Return the known faults that answer a request so after some sweeps, and that number.
+    """Return the known fault that answers a request so after some sweeps, and that number.
 
-    There are none if the right program does.
+    There is none if the right program does.
     """
     outputs = comparable(Exchange(case, answer, answer))
     count = _sweeps(base, method, outputs, tolerance)
-    entries = list[Entry]()
     for entry in known(dictionaries) if count is None else ():
         with suppress(SyntaxError, ValueError):
-            own = _sweeps(entry.changed_program(), method, outputs, tolerance)
-            if own is not None and count in (None, own):
-                entries, count = [*entries, entry], own
-    return entries, count
+            count = _sweeps(entry.changed_program(), method, outputs, tolerance)
+            if count is not None:
+                return [entry], count
+    return [], count
 
 
 def known(dictionaries: Iterable[Dictionary]) -> list[Entry]:

@@ -15,7 +15,7 @@ from ..gaps import difference
 from ..greeting import Greeting
 from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
-from .constant_sweeps import known_faults, makes_constant_sweeps
+from .constant_sweeps import known_fault, makes_constant_sweeps
 from .entry import Dictionary, Entry, file_of, likelihood, read
 from .requests import IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
 
@@ -62,7 +62,7 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
     if task == IK and makes_constant_sweeps(cases, first):
         assert isinstance(first[0], Answer)
         base = Program(source_of(IN_DICTIONARY[methods[0]][0]))
-        known = known_faults(base, dictionaries.values(), methods[0], cases[0], first[0], tolerance)
+        known = known_fault(base, dictionaries.values(), methods[0], cases[0], first[0], tolerance)
         if known[1] != 1:  # which solves show better
             return Proposals(*known)
     ranks, is_wrong = list[tuple[int, Entry]](), False
