@@ -1,8 +1,9 @@
 """The known faults of a solver that makes a constant number of sweeps, whatever is asked."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -68,13 +69,13 @@ def _sweeps(program: Program, method: str, exchange: Exchange, tolerance: float)
     case = exchange.case
     assert isinstance(exchange.answer, Answer)
     for count in range(1, MAX_SWEEPS + 1):
-        values, before = {}, case.inputs["local_rotations"]
+        values: Mapping[str, Any] = {}
         with suppress(Exception), program.within(PASSES):  # of a changed program any may come
             values = answer_of(program, method, case)
         if difference(values, exchange.answer.values) <= tolerance:
             return count
         pose = values.get("local_rotations")
-        if pose is None or abs(pose - before).max() <= STAYING:
+        if pose is None or abs(pose - case.inputs["local_rotations"]).max() <= STAYING:
             return None
         case = replace(case, inputs={**case.inputs, "local_rotations": pose})
     return None
