@@ -8,9 +8,10 @@ import pytest
 
 from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.disciplines import DISCIPLINES
-from plumbob.verify.fault_programs import coded_faults, source_of
+from plumbob.verify.fault_programs import coded_faults, contestant_of, source_of
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.kinematics import robot_targets
+from plumbob.verify.kinematics.robot_motions import STEPS
 from plumbob.verify.kinematics.robot_motions import TASK as TRACK
 from plumbob.verify.kinematics.robot_targets import TASK
 from plumbob.verify.one_line.search import with_changed_line
@@ -90,7 +91,15 @@ def test_nothing_is_named_in_right_steps(form):
 
 
 @pytest.mark.parametrize(
-    "code", ["PB-ROBOT-004", "PB-ROBOT-016", "PB-ROBOT-018", "PB-ROBOT-053", "PB-ROBOT-060"]
+    "code",
+    [
+        "PB-ROBOT-004",
+        "PB-ROBOT-016",
+        "PB-ROBOT-018",
+        "PB-ROBOT-053",
+        "PB-ROBOT-060",
+        "PB-ROBOT-082",
+    ],
 )
 def test_known_faults_are_named_whatever_the_damping_of_the_solver_is(code):
     """The faults are planted in the form that has their lines."""
@@ -108,3 +117,30 @@ def test_frames_of_motions_are_poses_too():
     report = DISCIPLINES[TRACK].judge([exchange], GREETING, "")
     (ends,) = views(report)
     assert [np.shape(j.case.inputs["target_position"]) for j in ends.judgements] == [(3,)] * 3
+
+
+def test_a_known_fault_of_whole_motions_is_named():
+    contestant = contestant_of(coded_faults()["PB-ROBOT-091"].wrong_program)
+    motions = DISCIPLINES[TRACK].cases(contestant.greeting, "", 0, False)
+    exchanges = []
+    for case in [case for case in motions if case.family == STEPS]:
+        answer = contestant.answer(case)
+        exchanges.append(Exchange(case, answer, answer))
+    report = replace(DISCIPLINES[TRACK].judge(exchanges, contestant.greeting, ""),
+                     exchanges=exchanges, greeting=contestant.greeting)  # fmt: skip
+    (explanation, *_) = with_changed_line(report, contestant.greeting).diagnosis.explanations
+    assert explanation.codes == ("PB-ROBOT-091",)
+
+
+@pytest.mark.slow
+def test_a_target_with_another_rotation_is_no_target_without_one():
+    """A tool that is always rotated in the same wrong way does not ignore rotations."""
+    right = "target = pose(matrix(target_rotation), target_position)"
+    source = source_of("tool step by screws")
+    assert source.count(right) == 1
+    turned = (
+        "matrix(target_rotation) @ exponential(np.array([0.3, 0.2, 0.1, 0, 0, 0]), 1.0)[:3, :3]"
+    )
+    report = report_of(source.replace(right, f"target = pose({turned}, target_position)"))
+    explanations = with_changed_line(report, GREETING).diagnosis.explanations
+    assert all("PB-ROBOT-008" not in explanation.codes for explanation in explanations)

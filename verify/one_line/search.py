@@ -181,8 +181,8 @@ def changed_lines(
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
     best, functions = tuple[Explanation, ...](), set[str]()
-    if report.task in tool_steps.SOLVES:
-        compared = compared[: tool_steps.MAX_SOLVES]
+    if report.task == tool_steps.MOTIONS:
+        compared = compared[: tool_steps.MAX_MOTIONS]
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
