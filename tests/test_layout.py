@@ -270,7 +270,7 @@ def test_every_room_and_its_tests_have_a_budget():
 DIAGNOSIS = {
     "cause_search", "explain", "fault_programs", "one_line", "observe", "programs", "dictionary",
     *(f"kinematics/{name}" for name in (
-        "claims", "early_ends", "faults", "resample_faults")),
+        "claims", "early_ends", "faults")),
     *(f"mass_spring/{name}" for name in ("faults", "iterations", "relations", "search")),
 }  # fmt: skip
 BOTH = {"verify", "disciplines", "self_test", "pytest_laws", "door", "screen", "templates"}

@@ -20,7 +20,6 @@ from kinematics_solvers import (
     faulty,
     judged,
     judged_some,
-    named,
     reference,
     textbook,
     told,
@@ -33,7 +32,6 @@ from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import honest, problems, sweeps
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import forward, solve
-from plumbob.verify.kinematics.resample_faults import FAULTS as RESAMPLE_FAULTS
 from plumbob.verify.kinematics.textbook import Choices
 from plumbob.verify.verify import DISCIPLINES
 
@@ -401,18 +399,6 @@ def resampler(make):
         return make(case_of(RESAMPLE, inputs, line=line))
 
     return function
-
-
-@pytest.mark.sample("-0", every=15)
-@pytest.mark.parametrize(
-    ("key", "number"),
-    [(key, i) for key, choices in RESAMPLE_FAULTS.items() for i in range(len(choices))],
-)
-def test_fault_of_resampling_is_caught_and_named(key, number):
-    report = judged(RESAMPLE, resampler(RESAMPLE_FAULTS[key][number]))
-    # corners that are cut are a reservation
-    assert report.verdict >= (RIGHT_EXCEPT if key == "strokes shortened" else WRONG)
-    assert key in named(report)[0]
 
 
 def even(line, inputs, closed):

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation
+from plumbob.reference import Skeleton, forward_kinematics, local_from_global
 from plumbob.text.sentence import Sentence, codes_in, with_code
 
 from ..case import Case
@@ -20,7 +20,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Explanation, Verdict
 from .faults import TABLE
 from .pose_laws import AnsweredPose
-from .predictions import path_to, solve
+from .predictions import solve
 
 # What an output is in a right program. The rotations of an answer are compared as the positions
 # that they give, those that are `placed`.
@@ -42,7 +42,7 @@ MIN_ANSWERS, MIN_SHARE = 4, 0.9
 # those after sweeps by so many times as much.
 SAME, AFTER_SWEEPS = {"double": 1e-9, "single": 1e-4}, 1e3
 NAMES = {
-    "abs": np.abs, "norm": np.linalg.norm, "np": np, "rotate": rotation.rotate, "where": np.where,
+    "abs": np.abs, "norm": np.linalg.norm, "np": np, "where": np.where,
     "without": lambda v, axis: np.delete(v, "xyz".index(axis)),
 }  # fmt: skip
 
@@ -113,9 +113,8 @@ def values_of(
             for name in ("local", "answered_positions", "positions")
         )
         start = forward_kinematics(skeleton, inputs["local_rotations"]).positions[None]
-        below = [p >= 0 and effector in path_to(parents, p) for p in parents]
-        masks = {"path": np.isin(np.arange(len(parents)), path), "below": np.array(below),
-                 "effector": np.arange(len(parents)) == effector}  # fmt: skip
+        joints = np.arange(len(parents))
+        masks = {"path": np.isin(joints, path), "effector": joints == effector}
         values |= {name: mask[:, None] for name, mask in masks.items()} | {
             "q": q, "positions": positions, "placed": placed, "start": start,
             "placed_before": np.concatenate([start, placed[:-1]]),

@@ -1,4 +1,4 @@
-"""Resampling a polyline: laws, since every program has its own rule, and a few known faults."""
+"""Resampling a polyline: laws, since every program has its own rule."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
@@ -18,7 +18,6 @@ from ..laws import finding, judge_case
 from . import rounding
 from .polylines import Polyline
 from .report import report
-from .resampling import even_points
 from .skeletons import generator
 
 TASK = "resample"
@@ -93,11 +92,19 @@ def judge(
         judge_case(
             exchange, partial(_findings, exchange.case, greeting),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
-            partial(even_points, exchange.case),
+            partial(_even_points, exchange.case),
         )
         for exchange in exchanges
     ]  # fmt: skip
     return report(TASK, method, judgements, _behaviour_at_strokes(exchanges, greeting))
+
+
+def _even_points(case: Case) -> FloatArray:
+    """Return the right points along a line and its bridges, (point, 3) [m]."""
+    inputs, closed = case.inputs, bool(case.inputs["closed"])
+    line = Polyline(inputs["curve"], tuple(inputs["strokes"]), closed)
+    count = inputs["count"] if "count" in inputs else line.count(inputs["spacing"], closed)
+    return line.even_points(count, closed)
 
 
 def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> Sentence | None:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import takewhile
+from itertools import product, takewhile
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS
 from ..precision import judging_greeting
 from . import tool_steps
+from .fitted import fitted, is_fitted
 from .mutants import Mutant, Program
 from .right_programs import FAULTS, KINDS, answer_of, comparable, faults_in, programs_of
 
@@ -42,8 +43,9 @@ TRIAL_OF_QUARTERS = 6
 MIN_DIFFERENT = 3
 # The share of the answers that a program has to give.
 MIN_SHARE = 0.75
-# Cases for which a right program goes through its loops more often are left out: they take long.
-MAX_PASSES = 200
+# Cases for which a right program goes through its loops more often are left out: they take long,
+# unless a pass is along a curve. A known fault may have loops that the right program lacks.
+MAX_PASSES, OF_CURVES = 200, 2000
 # But not if they go as often through them for the shortest case, as a constant number of sweeps.
 LONGER = 3
 # No further right program is changed after so many changes, of half a millisecond each; where
@@ -51,6 +53,8 @@ LONGER = 3
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
+# The functions of programs with fitted constants that forward kinematics shows to be right.
+FOUNDATIONS = ("multiply", "conjugate", "rotate", "kinematics")
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
@@ -180,7 +184,6 @@ def changed_lines(
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
-    best, functions = tuple[Explanation, ...](), set[str]()
     if report.task == tool_steps.MOTIONS:
         compared = compared[: tool_steps.MAX_MOTIONS]
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
@@ -189,6 +192,7 @@ def changed_lines(
         for program in programs_of(report.task, report.method, greeting.step)
         if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
     ]
+    best = tuple[Explanation, ...]()
     if proposals is not None:
         if proposals.sweeps is not None:
             compared = _with_sweeps(compared, proposals.sweeps)
@@ -197,38 +201,66 @@ def changed_lines(
         # Answers that are right to all requests of the dictionary are wrong in special cases.
         first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
         programs = [p for p in programs if p.source in first and not proposals.is_wrong]
-    if report.task in tool_steps.SOLVES:
-        functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
     if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
+    best = best or _of_programs(programs, report, compared, tolerance, is_known)
+    return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _of_programs(
+    programs: Sequence[Program],
+    report: TaskReport,
+    compared: Sequence[Exchange],
+    tolerance: float,
+    is_known: bool,
+) -> tuple[Explanation, ...]:
+    """Return the fault or changed line of some programs that gives most answers."""
+    best, functions = tuple[Explanation, ...](), set[str]()
+    if report.task in tool_steps.SOLVES:
+        functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
     most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
     most = tool_steps.MAX_MUTANTS.get(report.task, most)
-    for program in () if best else programs:
+    # Motions take too long for changes of all lines.
+    lines = [] if is_known or report.task == tool_steps.MOTIONS else [functions]
+    # Known faults of all programs with fitted constants first: their lines take seconds each.
+    is_of_fitted = any(map(is_fitted, programs))
+    known = [None] if is_of_fitted or not lines else []
+    for changed, program in product([*known, *lines], programs):
+        if changed is not None and is_of_fitted and best and best[0].share >= MIN_SHARE:
+            break
         if report.task in IN_CONVENTIONS:
             functions.clear()
-        is_short = (
-            report.task != tool_steps.MOTIONS
-        )  # motions take too long for changes of all lines
-        explanations = _of_program(
-            program, report, compared, tolerance, functions if is_short and not is_known else None
-        )
+        explanations = _of_program(program, report, compared, tolerance, changed)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > most:
             break
-    return best if best and best[0].share >= MIN_SHARE else ()
+    return best
 
 
 def _gives(
     program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
 ) -> bool:
     """Return whether a right program gives all answers."""
-    pairs = ((answer_of(program, report.method, one.case), one.answer) for one in compared)
+    run = _runner(program, report, compared)
+    pairs = ((run(one.case), one.answer) for one in compared)
     return all(
         isinstance(answer, Answer) and difference(right, answer.values) <= tolerance
         for right, answer in pairs
     )
+
+
+def _runner(
+    program: Program, report: TaskReport, compared: Sequence[Exchange]
+) -> Callable[[Case], Mapping[str, Any]]:
+    """Return the function that gives the answers of a program, its constants fitted to a solver."""
+    run = partial(answer_of, program, report.method)
+    if not is_fitted(program):
+        return run
+    pairs = ((one.case.name, one.answer) for one in compared)
+    answers = {name: answer.values for name, answer in pairs if isinstance(answer, Answer)}
+    return partial(fitted, program, run, answers, {})
 
 
 def _of_program(
@@ -244,11 +276,13 @@ def _of_program(
     do not speak for a change. Lines are changed where no known fault gives all answers, except in
     `functions` that are changed already, or in none.
     """
-    run = partial(answer_of, program, report.method)
+    run = _runner(program, report, compared)
     different, same, passes = _compare(program, run, compared, tolerance)
     least = MIN_DIFFERENT if report.verdict <= Verdict.RIGHT_EXCEPT else 1
     if len(different) < least:
         return ()
+    if is_fitted(program):  # a chance fit of few numbers costs time
+        different.sort(key=lambda exchange: -len(exchange.case.facts["path"]))
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
     def variants() -> Iterator[Variant]:
@@ -256,10 +290,14 @@ def _of_program(
             faults[fault.name] = fault
             with suppress(SyntaxError):
                 wrong = program.with_source(fault.planted_in(program.source))
-                yield Variant((fault.name,), partial(_faulty_answer, wrong, report, passes))
+                run_wrong = _runner(wrong, report, compared)
+                predict = partial(_faulty_answer, wrong, run_wrong, passes)
+                yield Variant((fault.name,), predict)
         if len(different) < MIN_DIFFERENT or functions is None:
             return
         program.observe(partial(run, different[0].case))
+        if is_fitted(program):
+            functions.update(map(program.text_of, FOUNDATIONS))
         for number, mutant in enumerate(program.mutants(functions)):
             mutants[str(number)] = mutant
             predict = partial(_changed_answer, program, mutant, passes, run)
@@ -314,8 +352,8 @@ def _of_changes(
                 faults = tuple(coded_faults()[code].name for code in entry.codes) or (str(number),)
                 changes[" + ".join(faults)] = entry
                 with suppress(SyntaxError, ValueError):
-                    yield Variant(faults, _answer_of_entry(entry, program, report, passes),
-                                  is_special=not entry.codes)  # fmt: skip
+                    predict = _answer_of_entry(entry, program, report, compared, passes)
+                    yield Variant(faults, predict, is_special=not entry.codes)
 
     def describe(keys: Sequence[str]) -> Sentence:
         if not changes[keys[0]].codes:
@@ -328,15 +366,19 @@ def _of_changes(
 
 
 def _answer_of_entry(
-    entry: Entry, program: Program, report: TaskReport, passes: Mapping[str, int]
+    entry: Entry,
+    program: Program,
+    report: TaskReport,
+    compared: Sequence[Exchange],
+    passes: Mapping[str, int],
 ) -> Callable[[Case], Mapping[str, Any]]:
     """Return the function that answers as an entry's change of a program."""
     if entry.codes:
-        return partial(_faulty_answer, entry.changed_program(), report, passes)
+        wrong = entry.changed_program()
+        return partial(_faulty_answer, wrong, _runner(wrong, report, compared), passes)
     mutant = program.mutant_of(entry.kind, entry.function, entry.right, entry.wrong, entry.text)
-    return partial(
-        _changed_answer, program, mutant, passes, partial(answer_of, program, report.method)
-    )
+    run = _runner(program, report, compared)
+    return partial(_changed_answer, program, mutant, passes, run)
 
 
 def _with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
@@ -375,7 +417,8 @@ def _compare(
     passes, different, same = dict[str, int](), list[Exchange](), list[Exchange]()
     for exchange, (right, count) in zip(compared, answers, strict=True):
         assert isinstance(exchange.answer, Answer)
-        if count <= most:
+        is_curve = exchange.case.task == "resample"
+        if count <= (OF_CURVES if is_curve else most):
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
             (same if is_same else different).append(exchange)
@@ -438,10 +481,13 @@ def _changed_answer(
 
 
 def _faulty_answer(
-    program: Program, report: TaskReport, passes: Mapping[str, int], case: Case
+    program: Program,
+    run: Callable[[Case], Mapping[str, Any]],
+    passes: Mapping[str, int],
+    case: Case,
 ) -> Mapping[str, Any]:
-    with program.within(passes[case.name]):
-        return answer_of(program, report.method, case)
+    with program.within(max(passes[case.name], MAX_PASSES)):
+        return run(case)
 
 
 def _describe(
