@@ -1,6 +1,7 @@
 """The tasks, each with its cases, its laws, and the search for the cause of wrong answers."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 from .case import Case
@@ -22,8 +23,7 @@ from .kinematics import (
     track,
     track_diagnosis,
 )
-from .kinematics.report import with_hints
-from .mass_spring import energy, energy_diagnosis, force_diagnosis, forces, step_diagnosis
+from .mass_spring import energy, forces, step_diagnosis
 from .mass_spring.stepping import Stepping
 
 
@@ -39,20 +39,19 @@ class Discipline(NamedTuple):
     diagnose: Callable[[JudgedAnswers], Diagnosis]
 
 
-def _of_laws(judged_answers: JudgedAnswers) -> Diagnosis:
-    """Return the diagnosis of answers of which nothing is known but broken laws."""
-    report = judged_answers.report
-    return with_hints(report.judgements, Diagnosis(behaviour=report.diagnosis.behaviour))
+def _by_laws(judged_answers: JudgedAnswers) -> Diagnosis:
+    """Return what laws say of answers that changed lines of right programs alone explain."""
+    return replace(judged_answers.report.diagnosis, explanations=())
 
 
-# The laws of each task, and what explains wrong answers before changed lines do, if anything.
+# The laws of each task, and what explains wrong answers besides changed lines.
 _PAIRS: Sequence[tuple[Any, Any]] = (
     (forward_kinematics, None),
     (inverse_kinematics, inverse_diagnosis),
     (track, track_diagnosis),
     (resample, resample_diagnosis),
-    (forces, force_diagnosis),
-    (energy, energy_diagnosis),
+    (forces, None),
+    (energy, None),
     (Stepping("mass_spring_step"), step_diagnosis),
     (Stepping("mass_spring_motion"), step_diagnosis),
     (robot_jacobian, robot_diagnosis),
@@ -61,6 +60,6 @@ _PAIRS: Sequence[tuple[Any, Any]] = (
     (robot_track, robot_diagnosis),
 )
 DISCIPLINES: dict[str, Discipline] = {
-    laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose if causes else _of_laws)
+    laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose if causes else _by_laws)
     for laws, causes in _PAIRS
 }

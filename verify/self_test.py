@@ -5,7 +5,7 @@ sent, or if it is named beside a reservation; a mere reservation (RIGHT EXCEPT) 
 """
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import Any, Literal, NamedTuple
@@ -32,10 +32,7 @@ from .kinematics.robot_jacobian import TASK as ROBOT_JACOBIAN
 from .kinematics.robot_motions import TASK as ROBOT_TRACK
 from .kinematics.robot_motions import followed
 from .kinematics.robot_velocity import TASK as ROBOT_VELOCITY
-from .mass_spring.faults import FORCE_FAULTS, STEP_FAULTS
-from .mass_spring.force_diagnosis import forces_with
 from .mass_spring.model import Integrator, StepModel, simulate
-from .mass_spring.options import Option, apply
 from .mass_spring.problem import problem_of, state_of, system_of
 from .one_line.right_programs import BY_LINES, is_of
 from .verify import verify
@@ -49,7 +46,11 @@ PINS: dict[str, Literal["overwritten", "penalty", "heavy"]] = {
 }
 PRECISIONS: dict[Precision, type] = {"double": np.float64, "single": np.float32}
 FK, IK, STEP = "forward_kinematics", "inverse_kinematics", "mass_spring_step"
-MOTION = "mass_spring_motion"
+# The families of faults of mass-spring systems, by task.
+MASS_SPRING = {
+    "mass_spring_forces": "forces", "energy": "energies", STEP: "steps",
+    "mass_spring_motion": "steps",
+}  # fmt: skip
 # The headings of the families of faults of kinematics.
 FAMILIES = {"FK": "forward kinematics", "QUAT": "quaternions", "CCD": "CCD", "FABRIK": "FABRIK"}
 ALL_SYSTEMS = System(external_forces=True, tension_only=True)
@@ -216,37 +217,18 @@ DECLARED: dict[str, tuple[StepModel, Step]] = {
     "local/global": (LOCAL_GLOBAL, _declared(LOCAL_GLOBAL, "local_global", 10)),
     "symplectic": (SYMPLECTIC, _declared(SYMPLECTIC, "symplectic")),
 }
-# Faults that requests for forces cannot show: these mark no tension-only springs.
-NO_FORCES = ("tension only ignored",)
-# The models that have a fault; the other faults are tried on a linearised step.
-_BASES = {
-    "h not divided": "symplectic",
-    "a substep missing": "symplectic",
-    "pins free until the end": "symplectic",
-    "velocity over the whole h": "symplectic",
-    "moved in place": "symplectic",
-    "pins at the origin": "local/global",
-    "damping matrix with h^1 too much": "linearised, implicit damping",
-    "damping matrix with h^-1 too much": "linearised, implicit damping",
-}
 
 
 class Stepper:
-    """A step with faults, which keeps the first h of each system for cached factors."""
+    """An honest step."""
 
-    def __init__(
-        self, model: StepModel, faults: Sequence[Option] = (), precision: type = np.float64
-    ) -> None:
-        self.model, self.faults, self.precision = model, tuple(faults), precision
-        self.first_h: dict[tuple[bytes, bytes], float] = {}
+    def __init__(self, model: StepModel, precision: type = np.float64) -> None:
+        self.model, self.precision = model, precision
 
     def __call__(self, **inputs: Any) -> dict[str, Any]:
         """Return positions and velocities, rounded to the precision."""
-        system = inputs["masses"].tobytes(), inputs["stiffnesses"].tobytes()
-        p = problem_of(self._rounded(inputs), self.first_h.setdefault(system, inputs["h"]))
-        p, model = apply(self.faults, p, self.model)
         with np.errstate(all="ignore"):
-            return self._rounded(simulate(p, model))
+            return self._rounded(simulate(problem_of(self._rounded(inputs)), self.model))
 
     def _rounded(self, values: Mapping[str, Any]) -> dict[str, Any]:
         return {
@@ -258,28 +240,12 @@ class Stepper:
 
 
 def _mass_spring_faults() -> Iterator[Subject]:
-    options = _by_key([fault for fault in FORCE_FAULTS if fault.key not in NO_FORCES])
-    functions = {key: partial(_evaluated, option) for key, option in options.items()}
-    yield from _subjects("forces", "mass_spring_forces", functions, system=ALL_SYSTEMS)
-    # The short programs of faults have those of the forces or of the matrix alone.
-    for key, option in _by_key([fault for fault in STEP_FAULTS if not fault.part]).items():
-        base = "converged" if key.startswith("dampers at rest") else "linearised"
-        model, step = DECLARED[_BASES.get(key, base)]
-        stepper = {key: Stepper(model, [option])}
-        task = MOTION if option.aspect == "frames" else STEP
-        yield from _subjects("steps", task, stepper, system=ALL_SYSTEMS, step=step)
-
-
-def _by_key(options: Sequence[Option]) -> dict[str, Option]:
-    """Return the first option of each key."""
-    first: dict[str, Option] = {}
-    for option in options:
-        first.setdefault(option.key, option)
-    return first
-
-
-def _evaluated(option: Option, /, **inputs: Any) -> Mapping[str, Any]:
-    return {"forces": forces_with((option,), problem_of(inputs))}
+    for fault in coded_faults().values():
+        if fault.task in MASS_SPRING:
+            function = _function(fault.task, fault.wrong_program)
+            greeting = contestant_of(fault.wrong_program).greeting
+            family = MASS_SPRING[fault.task]
+            yield Subject(fault.name, family, fault.task, function, greeting, fault.name)
 
 
 def _right_kinematics() -> Iterator[Subject]:
@@ -328,7 +294,7 @@ _REFERENCE: dict[str, tuple[Callable[..., Any], Step]] = {
 def _right_steps() -> Iterator[Subject]:
     for name, (model, step) in DECLARED.items():
         for precision, kind in PRECISIONS.items():
-            stepper = {f"{name}, {precision}": Stepper(model, (), kind)}
+            stepper = {f"{name}, {precision}": Stepper(model, kind)}
             yield from _subjects(HONEST, STEP, stepper, step=step, precision=precision)
         yield from _subjects(HONEST, STEP, {f"{name}, undeclared": Stepper(model)})
     for pins, declared in PINS.items():

@@ -45,7 +45,7 @@ def wrong_cases(report):
 SYMPLECTIC = StepModel(Integrator("symplectic"), 1, "explicit", velocity="separate")
 RIGHT = {
     FORCES: lambda **inputs: {"forces": all_forces(problem_of(inputs))},
-    ENERGY: lambda **inputs: energy.predict((), problem_of(inputs)),
+    ENERGY: lambda **inputs: energy.predict(problem_of(inputs)),
     STEP: Stepper(SYMPLECTIC),
     MOTION: Stepper(SYMPLECTIC),
 }

@@ -8,10 +8,12 @@ import pytest
 from plumbob.verify.contestant import Answer
 from plumbob.verify.dictionary import look_up as module
 from plumbob.verify.dictionary.build import digest
-from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, read
+from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, merged, read
 from plumbob.verify.dictionary.look_up import UNSTEADY, look_up
 from plumbob.verify.dictionary.requests import (
+    ENERGY,
     FK,
+    FORCES,
     IK,
     OUTPUTS,
     TASKS,
@@ -20,9 +22,16 @@ from plumbob.verify.dictionary.requests import (
     requests,
     suitable,
 )
-from plumbob.verify.fault_programs import IN_DICTIONARY, changes_of, coded_faults, source_of
+from plumbob.verify.fault_programs import (
+    IN_DICTIONARY,
+    changes_of,
+    coded_faults,
+    contestant_of,
+    source_of,
+)
 from plumbob.verify.functions import FunctionContestant
-from plumbob.verify.greeting import PROTOCOL, Greeting
+from plumbob.verify.greeting import PROTOCOL, Greeting, System
+from plumbob.verify.judgement import Verdict
 from plumbob.verify.one_line import search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.one_line.right_programs import answer_of
@@ -220,3 +229,30 @@ def test_cases_decide_what_is_named(factor):
 def test_a_changed_line_says_how_many_are_equal():
     counts = [entry.equal_count for entry in dictionary_of(FK, "").entries]
     assert max(counts) > 1
+
+
+def test_two_changes_at_once_keep_the_lines_of_both():
+    right = "a = 1\nb = 2\nc = 3"
+    assert merged(right, "a = 0\nb = 2\nc = 3", "a = 1\nb = 2\nc = 4") == "a = 0\nb = 2\nc = 4"
+    with pytest.raises(ValueError, match="one line"):
+        merged(right, "a = 0\nb = 2\nc = 3", "a = 5\nb = 2\nc = 3")
+
+
+def test_two_mistakes_of_forces_are_named_together():
+    codes = "PB-FORCE-005", "PB-FORCE-019"  # gravity upwards, and springs that push
+    source = coded_faults()[codes[0]].wrong_program
+    source = coded_faults()[codes[1]].planted_in(source)
+    contestant = contestant_of(source)
+    cases = DISCIPLINES[FORCES].cases(contestant.greeting, "", 0, False)
+    report = judge_cases(contestant, FORCES, "", cases)
+    report = with_changed_line(report, contestant.greeting, contestant)
+    assert report.verdict is Verdict.WRONG
+    assert {*report.diagnosis.explanations[0].codes} == {*codes}
+
+
+@pytest.mark.parametrize("task", [FORCES, ENERGY])
+def test_requests_of_springs_go_to_solvers_of_all_numbers(task):
+    (case, *_) = requests(task, "")
+    assert suitable(case, Greeting(PROTOCOL, (task,)))
+    for system in (System(masses="one"), System(gravity="number"), System(rest_lengths="measured")):
+        assert not suitable(case, Greeting(PROTOCOL, (task,), system=system))

@@ -199,7 +199,6 @@ def test_a_penalty_s_pin_may_move_as_far_as_the_penalty_lets_it(pins, best):
         LINEARISED._replace(scaling=0.98),
         LINEARISED._replace(damper="diagonal"),
         LINEARISED._replace(damper="blocks"),
-        StepModel(Integrator("descent")),
     ],
 )
 def test_momentum_is_no_law_of_steps_that_do_not_keep_it(model):

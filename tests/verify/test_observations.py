@@ -3,6 +3,7 @@
 import random
 import sys
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,8 +11,11 @@ from kinematics_solvers import faulty, textbook
 from observed_programs import PROGRAMS
 
 from plumbob.reference import rotation
+from plumbob.text.sentence import sentence
+from plumbob.verify.case import Case
+from plumbob.verify.contestant import Answer, Failure, FailureKind
 from plumbob.verify.functions import FunctionContestant
-from plumbob.verify.greeting import Greeting
+from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 from plumbob.verify.laws import finding
 from plumbob.verify.mass_spring.model import Integrator, StepModel, predicted
@@ -66,11 +70,11 @@ SENTENCES = {
     "ten_sweeps": ["The answers do not depend on max_iterations, on which right answers do"],
     "gravity_constant": [
         "The answers do not depend on gravity",
-        "Gravity is (0, -9.8, 0) in all 21 cases",
+        "Gravity is (0, -9.8, 0) in all 37 cases",
         "Without springs x' - x = h v - 9.8 h² (0, 1, 0); right is h v + h² g",
         "Right everywhere: what springs pull",
     ],
-    "velocities_without_h": ["Velocities are x' - x in all 42 cases"],
+    "velocities_without_h": ["Velocities are x' - x in all 58 cases"],
     "quartic_energy": ["Every spring pulls -1/2 k l + 1/2 k l³/r² + c dl/dt"],
 }
 
@@ -176,6 +180,47 @@ def few_cases(table, count):
     copy = ElementTable("rotation")
     copy.elements = [element for element in table.elements if element.case in names]
     return copy
+
+
+def half_forces(masses, springs, rest_lengths, stiffnesses, pinned, gravity, positions,
+                velocities, h, **_):  # fmt: skip
+    """One linearised step with half of the springs' forces, and a quarter of a term of K."""
+    n, M = len(masses), np.diag(np.repeat(masses, 3))
+    f, K = masses[:, None] * gravity, np.zeros((n, 3, n, 3))
+    for (i, j), r, k in zip(springs, rest_lengths, stiffnesses, strict=True):
+        d = positions[i] - positions[j]
+        length = np.linalg.norm(d)
+        u = d / length
+        block = 0.5 * k * (1.0 - r / length) * np.eye(3) + 0.25 * k * r / length * np.outer(u, u)
+        for a, b, sign in ((i, i, 1), (j, j, 1), (i, j, -1), (j, i, -1)):
+            K[a, :, b] += sign * block
+        f[i] -= 0.5 * k * (length - r) * u
+        f[j] += 0.5 * k * (length - r) * u
+    free = np.setdiff1d(np.arange(3 * n), 3 * pinned[:, None] + np.arange(3))
+    K, v = K.reshape(3 * n, 3 * n), velocities.ravel().copy()
+    b = h * (f.ravel() - h * K @ v)
+    v[free] += np.linalg.solve((M + h**2 * K)[np.ix_(free, free)], b[free])
+    v = v.reshape(n, 3)
+    return {"positions": positions + h * v, "velocities": v}
+
+
+def test_what_springs_pull_in_a_linearised_step_is_solved_from_pairs():
+    declared = Step("linearised", damper="none", pins="eliminated")
+    (first, *_) = observed(half_forces, STEP, step=declared)
+    assert "every spring pulls 1/2 k l - 1/2 k r + 1/2 k e - 1/4 k r e/l along it" in first
+    assert "1/2 k - 1/2 k r/l for each metre" in first
+    assert "right are k l - k r + k e and k - k r/l" in first
+
+
+def test_requests_without_an_answer_are_left_out_and_a_crash_ends_them():
+    def answered(kind):
+        failures = iter([Failure(kind, sentence("It failed.")), *[Answer({}, 0.0)] * 9])
+        contestant = SimpleNamespace(answer=lambda case: next(failures))
+        cases = [Case("", STEP, {}, "", sentence(""))] * 5
+        return len(observations._ask(contestant, cases, ""))
+
+    assert answered(FailureKind.RAISED) == 4
+    assert answered(FailureKind.CRASHED) == 0
 
 
 def test_separations_are_found_and_shuffled_labels_show_none(monkeypatch):

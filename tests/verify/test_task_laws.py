@@ -96,7 +96,7 @@ def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
 def test_parts_of_the_energy_add_up_to_rounding(spring, name, share, verdict):
     """Four times the rounding of one part."""
     allowed = energy.tolerance(spring, EPSILON)
-    given = energy.predict((), spring)
+    given = energy.predict(spring)
     shift = share * 4.0 * allowed
     given[name] += shift
     if name == "potential":
@@ -110,7 +110,7 @@ def test_a_sum_of_energies_is_judged_to_rounding(share, verdict):
     greeting = Greeting(1, ("energy",))
     case = energy.cases(greeting, "", 0, False)[0]
     p = problem_of(case.inputs)
-    answered = energy.predict((), p)
+    answered = energy.predict(p)
     answered["total"] += share * 4.0 * energy.tolerance(p, EPSILON)
     answer = Answer(answered, 0.0)
     (judgement,) = energy.judge([Exchange(case, answer, answer)], greeting, "").judgements

@@ -17,7 +17,7 @@ from ..fault_programs import IN_DICTIONARY, changes_of, source_of
 from ..one_line.mutants import ENTRIES, Program
 from ..one_line.right_programs import answer_of, faults_in
 from .entry import Dictionary, Entry, likelihood
-from .requests import FK, OUTPUTS, fractions, is_solve, keys, requests
+from .requests import FK, LARGEST, OUTPUTS, fractions, is_solve, keys, requests
 
 # Differences of keys above this tell answers apart, the shortest distance of a look-up.
 DISTINCT = 1e-6
@@ -26,8 +26,6 @@ DISTINCT = 1e-6
 NUDGE, MOVED = 1e-14, 1e-9
 # The most entries with equal keys that are kept, the likeliest ones.
 EQUAL = 3
-# Keys beyond this come from divisions by nearly zero.
-LARGEST = 1e6
 # The functions whose changes are tried in each program: they do other things to other forms.
 IN_FORMS = {"conjugate", "cross", "product", "product_of_vectors", "by_cross", "by_product"}
 
@@ -142,7 +140,6 @@ def _row(
             break
         with suppress(Exception):  # of a changed program any may come
             row[i] = keys(run(case), right[i], case)
-    row[~(np.abs(row) < LARGEST)] = np.nan
     return row if _is_wrong(row) else None
 
 

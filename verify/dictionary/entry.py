@@ -2,6 +2,8 @@
 
 import json
 import lzma
+from difflib import SequenceMatcher
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -42,6 +44,46 @@ class Entry(NamedTuple):
         if self.text:
             exec(compile(self.text, self.program, "exec"), program.names)
         return program
+
+    def texts(self) -> dict[str, str]:
+        """Return the functions that the change has made, by their names."""
+        if self.text:
+            return {self.function: self.text}
+        right = Program(source_of(self.program)).texts
+        return {k: t for k, t in self.changed_program().texts.items() if right.get(k) != t}
+
+
+class Pair(NamedTuple):
+    """Two changes of a right program at once."""
+
+    first: Entry
+    second: Entry
+
+    def changed_program(self) -> Program:
+        """Return the program with both changes; raise ValueError if they share a line."""
+        program = Program(source_of(self.first.program))
+        right, texts = program.texts, self.first.texts()
+        for name, text in self.second.texts().items():
+            texts[name] = merged(right[name], texts[name], text) if name in texts else text
+        for text in texts.values():
+            exec(compile(text, self.first.program, "exec"), program.names)
+        return program
+
+
+def merged(right: str, first: str, second: str) -> str:
+    """Return a text with the lines that two others change; raise ValueError if they share one."""
+    lines, changes = right.splitlines(), list[tuple[int, int, list[str]]]()
+    for text in (first, second):
+        new = text.splitlines()
+        for tag, i, j, m, n in SequenceMatcher(None, lines, new, autojunk=False).get_opcodes():
+            if tag != "equal":
+                changes.append((i, j, new[m:n]))
+    changes.sort(key=lambda change: change[:2])
+    if any(before[1] > after[0] for before, after in pairwise(changes)):
+        raise ValueError("both changes are in one line")
+    for i, j, replacement in reversed(changes):
+        lines[i:j] = replacement
+    return "\n".join(lines)
 
 
 def likelihood(entry: Entry) -> tuple[Any, ...]:

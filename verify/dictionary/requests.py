@@ -17,10 +17,12 @@ from ..case import Case
 from ..greeting import Greeting
 from ..kinematics.problems import facts
 from ..kinematics.skeletons import suits
+from ..mass_spring.cases import UNDAMPED
 
 FK, IK = "forward_kinematics", "inverse_kinematics"
+FORCES, ENERGY = "mass_spring_forces", "energy"
 # The tasks and methods with a dictionary.
-TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"))
+TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"), (FORCES, ""), (ENERGY, ""))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
 # Parents, effector and target of each: a tree with an inner effector, a chain, one in a plane.
 TREE = ([-1, 0, 1, 1, 3, 4], 4, (1.4, -1.0, -1.4))
@@ -32,14 +34,33 @@ PROBLEMS = (
     (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*TREE, 0.0, 3),
     (*CHAIN[:2], (-1.1, -0.6, 0.3), 4e-3, 16),
 )  # fmt: skip
+# A triangle with a tail; every spring has numbers of its own.
+SPRINGS = np.array([[0, 1], [2, 0], [1, 2], [2, 3]])
+# What is zero in each request of a mass-spring system: the first three show springs, gravity and
+# motion alone, so that a mistake in one hides none in another; the last shows all of them.
+ZEROS = (
+    ("dampings", "gravity", "velocities"),
+    ("stiffnesses", "dampings", "velocities"),
+    ("stiffnesses", "gravity"),
+    (),
+)
 # The outputs that have keys, in their order: what poses have, and what the path has alone.
-OUTPUTS = {FK: ("positions", "rotations"), IK: ("local_rotations", "path")}
+OUTPUTS = {
+    FK: ("positions", "rotations"),
+    IK: ("local_rotations", "path"),
+    FORCES: ("forces",),
+    ENERGY: ("total", "kinetic", "potential", "elastic", "gravitational"),
+}
+# Keys beyond this come from divisions by nearly zero.
+LARGEST = 1e6
 # A size below which answers are compared absolutely.
 SMALLEST = 1e-12
 
 
 def requests(task: str, method: str) -> list[Case]:
     """Return the requests of a task and a method: of poses those alone that differ in the start."""
+    if task in (FORCES, ENERGY):
+        return [_spring_request(task, number) for number in range(len(ZEROS))]
     cases = []
     for number, problem in enumerate(PROBLEMS if task == IK else PROBLEMS[:3]):
         parents, effector, target, tolerance, sweeps = problem
@@ -66,8 +87,34 @@ def is_solve(case: Case) -> bool:
     return bool(case.inputs.get("max_iterations", 1) > 1)
 
 
+def _spring_request(task: str, number: int) -> Case:
+    """Return a request of a mass-spring system in which some inputs are zero."""
+    count, springs = 1 + int(SPRINGS.max()), SPRINGS.copy()
+    x = fractions(3 * count, 31).reshape(count, 3)
+    lengths = np.linalg.norm(np.diff(x[springs], axis=1)[:, 0], axis=1)
+    inputs: dict[str, Any] = {
+        "masses": 1.5 + fractions(count, 32),
+        "springs": springs,
+        # half of the springs are stretched, and half are compressed
+        "rest_lengths": lengths * (1.0 + 0.3 * np.array([1, -1, -1, 1]) * (1.5 + fractions(4, 33))),
+        "stiffnesses": 3.0 + 2.0 * fractions(4, 34),
+        "dampings": 1.5 + fractions(4, 35),
+        "gravity": np.array([1.1, -2.3, 0.7]),
+        "positions": x,
+        "velocities": fractions(3 * count, 36).reshape(count, 3),
+    }
+    inputs |= {name: 0.0 * inputs[name] for name in ZEROS[number]}
+    return Case(f"telling {number + 1}", task, inputs, "telling", ABOUT)
+
+
 def suitable(case: Case, greeting: Greeting) -> bool:
-    """Return whether a solver takes a request: free joints, in space or in a plane."""
+    """Return whether a solver takes a request: any numbers, or free joints in space or a plane."""
+    if case.task in (FORCES, ENERGY):
+        system = greeting.system
+        numbers = {system.masses, system.stiffnesses, system.dampings, system.rest_lengths}
+        takes_all = numbers == {"each", "given"} and system.gravity == "vector"
+        is_damped = case.task == ENERGY or greeting.step.damper not in UNDAMPED
+        return takes_all and is_damped and greeting.fixed.gravity is None and not greeting.planar
     is_planar = not case.inputs["offsets"][:, 2].any()
     is_free = greeting.rotations and greeting.planar is is_planar and not greeting.limits
     is_ended = greeting.fixed.tolerance is None or not case.inputs.get("tolerance")
@@ -83,9 +130,14 @@ def keys(values: Mapping[str, Any], right: Mapping[str, Any], case: Case) -> Flo
 
     A key is the difference from the right answer over its size, projected on one direction.
     """
-    return np.array(
-        [_key(_output(values, name), _output(right, name)) for name in OUTPUTS[case.task]]
-    )
+    names = OUTPUTS[case.task]
+    sizes = [
+        float(np.abs(output).max())
+        for name in names
+        if (output := _output(right, name)) is not None
+    ]
+    size = max(sizes) if case.task == ENERGY else None  # an energy may be zero
+    return np.array([_key(_output(values, name), _output(right, name), size) for name in names])
 
 
 def _output(values: Mapping[str, Any], name: str) -> FloatArray | None:
@@ -99,11 +151,13 @@ def _output(values: Mapping[str, Any], name: str) -> FloatArray | None:
     return np.asarray(output[..., :, None] * output[..., None, :])
 
 
-def _key(output: FloatArray | None, right: FloatArray | None) -> float:
+def _key(output: FloatArray | None, right: FloatArray | None, size: float | None) -> float:
     if output is None or right is None or np.shape(output) != np.shape(right):
         return np.nan
-    difference = np.ravel(output - right) / max(float(np.abs(right).max()), SMALLEST)
-    return float(fractions(difference.size, 5) @ difference)
+    size = float(np.abs(right).max()) if size is None else size
+    difference = np.ravel(output - right) / max(size, SMALLEST)
+    key = float(fractions(difference.size, 5) @ difference)
+    return key if abs(key) < LARGEST else np.nan
 
 
 @cache

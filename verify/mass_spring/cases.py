@@ -4,8 +4,10 @@ Each probe is a small case that adds an aspect of a step to the cases before it:
 a damper, a pin, a changed h. Faults are sought along the probes.
 """
 
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,8 +19,9 @@ from plumbob.text.sentence import Sentence, sentence
 from ..case import Case
 from ..greeting import Greeting, System
 from ..task import TASKS
-from .options import read_table
 
+# The telling requests of a single spring.
+TELLING_PAIRS = 16
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
@@ -33,7 +36,7 @@ UNDAMPED = ("none", "global_factor")
 # Scenes of more particles are cloths, which lie level.
 MOST_IN_TRIANGLES = 5
 GRAVITY = np.array([0.0, -9.81, 0.0])
-_TABLE = read_table("scenes.toml")
+_TABLE = tomllib.loads(Path(__file__).with_name("scenes.toml").read_text(encoding="utf-8"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +76,22 @@ def telling_cases(task: str, greeting: Greeting, seed: int) -> list[Case]:
     """Return requests to ask after a wrong verdict, of which each spring's pull can be solved."""
     about = sentence("a request that tells mistakes apart; no part of the verdict")
     drawn = [_random(seed, about=about, **entry) for entry in _TABLE["telling"]]
+    drawn += [_telling_pair(number, about) for number in range(TELLING_PAIRS)]
     return _suitable(task, greeting, drawn)
+
+
+def _telling_pair(number: int, about: Sentence) -> SpringScene:
+    """Return two free particles with one spring, by turns stretched and compressed."""
+    rng = np.random.default_rng([14, number])
+    pair = _random(number, 2, name=f"pair {number + 1}", family="several springs", about=about)
+    lengths = _lengths(pair.positions, np.array(pair.springs))
+    return replace(
+        pair,
+        rest_lengths=lengths * rng.uniform(*((0.6, 0.9), (1.1, 1.5))[number % 2]),
+        dampings=0.0 * pair.dampings,
+        gravity=rng.uniform(-9.0, 3.0, 3),
+        h=float(rng.uniform(0.01, 0.06)),
+    )
 
 
 def _suitable(task: str, greeting: Greeting, drawn: Sequence[SpringScene]) -> list[Case]:

@@ -25,10 +25,7 @@ from ..judgement import (
 )
 from ..laws import digits, finding, hints_of, judge_case
 from .cases import task_cases
-from .formulas import evaluate
 from .laws import not_finite
-from .model import StepModel
-from .options import Option, apply
 from .problem import (
     SpringProblem,
     all_forces,
@@ -40,7 +37,6 @@ from .problem import (
 
 TASK = "energy"
 Energies = Mapping[str, Any]
-PARTS = ("total", "kinetic", "potential", "elastic", "gravitational")
 SUMS = {"total": ("kinetic", "potential"), "potential": ("elastic", "gravitational")}
 ADDENDS = ("kinetic", "elastic", "gravitational")
 # Those of which each has a formula of its own.
@@ -81,34 +77,25 @@ def judge(
 ) -> TaskReport:
     """Hold the energies against formulas and the work of forces."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    diagnosis = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
+    answers = [j.answer.values for j in judgements if isinstance(j.answer, Answer)]
+    is_zero = bool(answers) and not any(any(values.values()) for values in answers)
+    first = sentence("Every energy is 0 in all cases.") if is_zero else first_broken(judgements)
+    diagnosis = Diagnosis(first_broken=first, hints=hints_of(judgements))
     return TaskReport(TASK, "", judgements, diagnosis)
 
 
-def predict(faults: Sequence[Option], p: SpringProblem) -> dict[str, float]:
-    """Return all energies by the formulas, as a solver with these faults has them [J]."""
-    p, _ = apply(faults, p, StepModel())
-    kinetic = 0.5 * (p.masses[:, None] * p.velocities**2).sum()
-    parts = np.array([kinetic, elastic_energy(p), -(p.constant * p.positions).sum()])
-    for fault in faults:
-        parts *= fault.parts or 1.0
-        if fault.energy and fault.energy[0] in ADDENDS:
-            parts[ADDENDS.index(fault.energy[0])] = evaluate(fault.formula, p)
-    energies = dict(zip(ADDENDS, parts.tolist(), strict=True))
-    return {name: sum_of(name, faults, energies) for name in SUMS} | energies
-
-
-def sum_of(whole: str, faults: Sequence[Option], energies: Energies) -> float:
-    """Return the total or the potential energy of these parts, as faults of sums have it [J]."""
-    factors = {part: 1.0 for part in ADDENDS if whole == "total" or part != "kinetic"}
-    for fault in faults:
-        if fault.energy[:1] != (whole,):
-            continue
-        if fault.formula:
-            return float(evaluate(fault.formula, None, energies))
-        named = SUMS["potential"] if fault.energy[1] == "potential" else fault.energy[1:2]
-        factors |= dict.fromkeys(named, fault.energy[2])
-    return sum(factor * energies[part] for part, factor in factors.items())
+def predict(p: SpringProblem) -> dict[str, float]:
+    """Return all energies by the formulas [J]."""
+    kinetic = 0.5 * float((p.masses[:, None] * p.velocities**2).sum())
+    elastic, gravitational = elastic_energy(p), -float((p.constant * p.positions).sum())
+    potential = elastic + gravitational
+    return {
+        "total": kinetic + potential,
+        "kinetic": kinetic,
+        "potential": potential,
+        "elastic": elastic,
+        "gravitational": gravitational,
+    }
 
 
 def tolerance(p: SpringProblem, epsilon: float) -> float:
@@ -127,7 +114,7 @@ def _judge_case(
     case, answer = exchange.case, exchange.answer
     p = problem_of(case.inputs)
     system, state = system_of(p), state_of(p)
-    expected, allowed = predict((), p), tolerance(p, greeting.epsilon)
+    expected, allowed = predict(p), tolerance(p, greeting.epsilon)
     outputs = answer.values if isinstance(answer, Answer) else {}
     gaps = {name: abs(outputs[name] - expected[name]) for name in FORMULAS if name in outputs}
     before = next((e for e in exchanges if e.case.name == case.facts.get("from")), None)
@@ -161,7 +148,7 @@ def _sums(energies: Energies) -> dict[str, float]:
         if {whole, *parts} <= energies.keys()
     }
     if "total" not in sums and {"total", *ADDENDS} <= energies.keys():
-        sums["total"] = abs(energies["total"] - sum_of("total", (), energies))
+        sums["total"] = abs(energies["total"] - sum(energies[name] for name in ADDENDS))
     return sums
 
 
@@ -189,13 +176,10 @@ def works(p: SpringProblem, q: SpringProblem) -> dict[str, float]:
         elastic += 0.5 * weight * float((forces * d).sum())
     gravitational = float((p.constant * d).sum())
     potential = elastic + gravitational
-    gained = predict((), q)["kinetic"] - predict((), before)["kinetic"]
+    gained = predict(q)["kinetic"] - predict(before)["kinetic"]
     return {
         "elastic": elastic,
         "gravitational": gravitational,
         "potential": potential,
         "total": potential - gained,
     }
-
-
-Answers = Sequence[tuple[SpringProblem, Energies]]

@@ -45,7 +45,8 @@ def judge(
 ) -> TaskReport:
     """Hold the forces against the formula and the balance of momentum."""
     judgements = [_judge_case(exchange, exchanges, greeting) for exchange in exchanges]
-    diagnosis = Diagnosis(first_broken=first_broken(judgements), hints=hints_of(judgements))
+    first = first_broken(judgements, "equal answers") or first_broken(judgements)
+    diagnosis = Diagnosis(first_broken=first, hints=hints_of(judgements))
     return TaskReport(TASK, "", judgements, diagnosis)
 
 

@@ -1,15 +1,19 @@
 """The choices that an honest solver may make, and which of them a greeting leaves open."""
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
-from typing import Any
+from itertools import product
+from pathlib import Path
+from typing import Any, NamedTuple
 
-from plumbob.text.sentence import sentence
+from plumbob.text.sentence import Sentence
 
 from ..greeting import Step
-from .model import EXPLICIT, RIGHT_MATRIX, Integrator
-from .options import ASPECTS, Option, options_of, read_table
+from .model import EXPLICIT, Integrator, StepModel
 
+# Aspects of a step in the order of the computation.
+ASPECTS = ("damper", "integrator", "substeps", "pins", "velocity", "scaling")
 # Symplectic Euler by the order of its updates.
 SYMPLECTIC = {"symplectic": "velocities_first", "positions_first": "positions_first"}
 # Methods with a number of iterations.
@@ -18,7 +22,35 @@ ITERATIVE = ("newton", "local_global")
 EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
 SYMPLECTIC_DAMPERS = ("diagonal", "blocks", "matrix")
 IMPLICIT_DAMPERS = ("length_rate", "end_velocity", "explicit", "none")
-_TABLE = read_table("honest.toml")
+_TABLE = tomllib.loads(Path(__file__).with_name("honest.toml").read_text(encoding="utf-8"))
+
+
+class Option(NamedTuple):
+    """A choice of a solver in an aspect of a step."""
+
+    aspect: str  # what it is a choice of; a solver makes one choice for each aspect
+    sentence: Sentence  # what it does
+    fields: Mapping[str, Any]  # the fields that it replaces in a model
+
+
+def model_of(options: Sequence[Option]) -> StepModel:
+    """Return the model of a solver with these options, without dampers unless one has them."""
+    fields = {name: value for option in options for name, value in option.fields.items()}
+    return StepModel(damper="none")._replace(**fields)
+
+
+def _options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
+    """Yield an option for each combination of the numbers in an entry's `each`."""
+    ranges = entry.get("each", {})
+    for numbers in product(*ranges.values()):
+        values = dict(zip(ranges, numbers, strict=True))
+        if "integrator" in entry:
+            choice: Any = Integrator(**entry["integrator"], **values)
+        elif isinstance(entry.get("value"), str):
+            choice = entry["value"].format(**values)
+        else:
+            choice = values.get(aspect, entry.get("value"))
+        yield Option(aspect, Sentence(entry["sentence"], values), {aspect: choice})
 
 
 @cache
@@ -31,7 +63,7 @@ def honest(step: Step) -> dict[str, tuple[Option, ...]]:
         aspect: tuple(
             option
             for entry in entries
-            for option in options_of(aspect, entry | {"each": {
+            for option in _options_of(aspect, entry | {"each": {
                 name: _including(values, numbers.get(name))
                 for name, values in entry.get("each", {}).items()
             }})
@@ -86,46 +118,19 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
     )
 
 
-def honest_domains(step: Step) -> dict[str, list[tuple[Option, int]]]:
-    """Return, for each aspect, the honest choices with their costs, 1 if the greeting denies them.
-
-    Those of cost 0 come first.
-    """
-    right, usual = honest(step), sentence("as it should be")
-    domains = {
-        aspect: [(option, int(not declared(option, step))) for option in right.get(aspect, ())]
-        for aspect in ASPECTS
-    }
-    return {
-        aspect: sorted(pairs, key=lambda pair: pair[1]) or [(Option("", aspect, usual), 0)]
-        for aspect, pairs in domains.items()
-    }
+def declared_choices(step: Step) -> dict[str, list[Option]]:
+    """Return, for each aspect, the honest choices that a greeting declares or leaves open."""
+    choices = honest(step)
+    return {a: [option for option in choices[a] if declared(option, step)] for a in ASPECTS}
 
 
 def compatible(options: Mapping[str, Option]) -> bool:
     """Return whether choices make sense together, as far as they are made."""
     fields = {k: value for option in options.values() for k, value in option.fields.items()}
     damper, velocity = fields.get("damper"), fields.get("velocity")
-    if "substeps" in fields and fields["substeps"] < _least_substeps(fields):
-        return False
     if "integrator" not in fields:
         return True
     method = fields["integrator"].method
-    if method in EXPLICIT and ("matrix" in fields or fields.get("time") == "before"):
-        return False
-    is_linearised = fields["integrator"][:3] == ("newton", "x_n", 1)
-    matrix = fields.get("matrix", RIGHT_MATRIX)
-    is_for_linearised = fields.get("dv") or matrix.inverse == "first order"
-    is_for_local_global = matrix.pins_element is not None
-    if (is_for_linearised and not is_linearised) or (
-        is_for_local_global and method != "local_global"
-    ):
-        return False
-    parts = {option.part for option in options.values()} - {"", "both"}
-    if method in EXPLICIT and (parts or ("update" in fields and method != "symplectic")):
-        return False
-    if fields.get("dampers_apart") and "matrix" not in fields:
-        return False
     if damper in SYMPLECTIC_DAMPERS and method not in SYMPLECTIC:
         return False
     if damper and damper not in (EXPLICIT_DAMPERS if method in EXPLICIT else IMPLICIT_DAMPERS):
@@ -136,25 +141,11 @@ def compatible(options: Mapping[str, Option]) -> bool:
     return _are_few(fields, method)
 
 
-def _least_substeps(fields: Mapping[str, Any]) -> int:
-    """Return the number of substeps below which a choice is another one."""
-    if fields.get("time") == "one substep less":
-        return 3  # one of two would be half of h
-    needs_several = (
-        fields.get("pins") == "at_the_end"
-        or fields.get("time") == "undivided"
-        or fields.get("keeps_forces")
-        or fields.get("velocity") == "d / whole"
-    )
-    return 2 if needs_several else 1
-
-
 def _are_few(fields: Mapping[str, Any], method: str) -> bool:
     """Return whether so many substeps are worth their time."""
     substeps = fields.get("substeps", 1)
     if method not in ("explicit", *SYMPLECTIC):
         return bool(substeps <= (30 if method in EXPLICIT else 20))
     usual = {"velocity": "separate", "scaling": 1.0}
-    plain = not fields.keys() & {"time", "keeps_forces"} and "inertia" not in fields
-    plain &= all(fields.get(name, choice) == choice for name, choice in usual.items())
-    return bool(substeps <= 30 or plain)
+    is_plain = all(fields.get(name, choice) == choice for name, choice in usual.items())
+    return bool(substeps <= 30 or is_plain)

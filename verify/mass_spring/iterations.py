@@ -1,13 +1,13 @@
 """Follow the iterations of a step up to answers that are not converged.
 
 An iteration that ends too early leaves one of its iterates. It shows what converged answers hide:
-the matrix, the energy that a line search compares, and the test by which the iteration ends.
+the test by which the iteration ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
-from itertools import groupby, islice, product
+from itertools import islice, product, takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +15,10 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence, with_code
 
-from ..explain import either, ending_test
+from ..explain import ending_test
+from ..fault_programs import coded_faults
 from ..judgement import LEAST_SHARE, Explanation
-from .faults import EARLY_END, FOLLOWED_FAULTS, KEPT_DIRECTIONS, STEP_FAULTS
-from .formulas import evaluate
+from .honest import Option, model_of
 from .laws import (
     IMPRECISE,
     ROUNDED,
@@ -29,18 +29,14 @@ from .laws import (
     stiffness_of,
 )  # fmt: skip
 from .model import (
-    DECREASE,
     ITERATES,
-    RIGHT_MATRIX,
     Integrator,
     StepEquation,
     StepModel,
-    conjugate_gradients,
     first_equation,
     predicted,
 )  # fmt: skip
 from .model_search import LARGEST, Probe
-from .options import Option, apply, read_table
 from .problem import SpringProblem
 
 # The most iterations that are followed; few solvers make more. Of other methods than Newton's it is
@@ -50,35 +46,45 @@ MAX_ITERATIONS = 100
 SAME = 1e-5
 # An iteration that moves by less than this share of the distance to an answer does not reach it.
 STATIONARY = 1e-6
-# A mistake must reproduce so many wrong answers, the smallest, before all are compared.
+# A method must reproduce so many wrong answers, the smallest, before all are compared.
 TRIALS = 3
-EXPLANATIONS = 3
+# The codes of iterations that end too early, and of a single local/global iteration.
+EARLY_END, KEPT_DIRECTIONS = "PB-STEP-168", "PB-STEP-183"
 # Where iterations may begin if a greeting declares a start; many call s_n y.
 STARTS: Mapping[str | None, Sequence[str]] = {
     None: ("y", "s_n", "x_n"), "y": ("y", "s_n"), "s_n": ("s_n",), "x_n": ("x_n",),
 }  # fmt: skip
-# Newton's method with the whole Hessian, and with less of it, which converges later.
-RIGHT_NEWTONS = [Integrator("newton", hessian=h) for h in ("exact", "gauss", "projected")]
-_TABLE = read_table("iterations.toml")
-NAMES = {method: Sentence(entry["sentence"], {}) for method, entry in _TABLE["methods"].items()}
-# What iterations may compare with a bound to end, one number for each iterate, and its words.
-TESTS = [
-    (partial(evaluate, entry["quantity"], None), None, Sentence(entry["sentence"], {}))
-    for entry in _TABLE["tests"]
-]
-
-
-class FollowedMethod(NamedTuple):
-    """A method with its iterations, right or with a mistake."""
-
-    integrator: Integrator
-    fault: Option | None = None
-
-    @property
-    def order(self) -> tuple[int, bool]:
-        """When it is compared: right, then with one of a few mistakes, then with one of many."""
-        rank = 0 if self.fault is None else 2 if self.fault.part else 1
-        return rank, self.integrator.decrease is None
+NAMES = {
+    "newton": sentence("Newton's method"),
+    "local_global": sentence("the local/global method"),
+    "linear": sentence("conjugate gradients"),
+}
+# What preconditions conjugate gradients with the matrix A, by the name in place of a Hessian's.
+SCALES: Mapping[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
+    "nothing": lambda A, masses: np.eye(len(A)),
+    "masses": lambda A, masses: np.diag(masses),
+    "diagonal": lambda A, masses: np.diag(np.diag(A)),
+    "blocks": lambda A, masses: A * np.kron(np.eye(len(A) // 3), np.ones((3, 3))),
+}
+# What iterations may compare with a bound to end, one number for each iterate of a track, and its
+# words.
+TESTS: Sequence[tuple[Callable[[Any], Any], None, Sentence]] = (
+    (lambda t: -np.arange(len(t["residuals"])), None,
+     sentence("after iteration {iterations}, whatever is left")),
+    (lambda t: t["moves"][:-1], None,
+     sentence("when no particle moves by more than about {bound:.2g} m")),
+    (lambda t: t["moves"][1:], None,
+     sentence("when the next move is shorter than about {bound:.2g} m, and leave it out")),
+    (lambda t: t["residuals"] / max(t["residuals"][0], 1e-300), None,
+     sentence("when the residual is below about {bound:.2g} of the first one")),
+    (lambda t: t["residuals"], None,
+     sentence("when the residual is below about {bound:.2g} kg m")),
+    (lambda t: t["residuals"] / t["h"], None,
+     sentence("when the residual of the equation for the change of velocity is below about "
+              "{bound:.2g}, whatever it was first")),
+    (lambda t: np.append(np.inf, -np.diff(t["energies"]) / abs(t["energies"][1:])), None,
+     sentence("when the energy g falls by less than about {bound:.2g} of its value")),
+)  # fmt: skip
 
 
 class StepAnswer(NamedTuple):
@@ -97,7 +103,7 @@ class StepAnswer(NamedTuple):
 
 
 class Track(NamedTuple):
-    """The iterates of a course up to an answer."""
+    """The iterates of a method up to an answer."""
 
     moves: FloatArray  # by how much a particle moves at most before each, and after the last [m]
     residuals: FloatArray
@@ -113,40 +119,26 @@ class Track(NamedTuple):
 
 
 def explanation(
-    options: Sequence[Option],
-    probes: Sequence[Probe],
-    start: str | None,
-    epsilon: float,
-    is_hasty: bool = False,
-    least_error: float = IMPRECISE,
+    options: Sequence[Option], probes: Sequence[Probe], start: str | None, epsilon: float
 ) -> Explanation | None:
-    """Return the mistake of the iteration that leaves the wrong answers, None if none is known.
+    """Return that iterations end too early where that leaves the wrong answers, else None.
 
-    It is None where no error is larger than `least_error` of the displacement.
-    In haste, where few answers are right, none of the many mistakes of Newton's method is sought.
-    Iterations without a mistake that end by no known test give way to those with one.
+    It is None where no error is larger than `IMPRECISE` of the displacement. Iterations that end by
+    no known test give way to those with one.
     """
     trials = trials_of(options, probes, epsilon)
     wrong = [trial for trial in trials if trial.error > SOLVED and not trial.is_unlike]
     wrong.sort(key=lambda trial: (is_indefinite(trial.problem), trial.problem.count))
-    if not any(trial.error > least_error for trial in wrong):
+    if not any(trial.error > IMPRECISE for trial in wrong):
         return None
-    is_hasty &= len(wrong) > (1.0 - LEAST_SHARE) * len(trials)
-    _, model = apply(options, trials[0].problem, StepModel(damper="none"))
-    courses, vague = sorted(_courses(model, STARTS[start]), key=lambda c: c.order), None
-    for _, group in groupby(courses, key=lambda c: c.order):
-        matches: dict[str, FollowedMethod] = {}
-        for course in group:
-            key = course.fault.key if course.fault else EARLY_END["key"]
-            is_tried = not is_hasty or course.fault in (None, *FOLLOWED_FAULTS)
-            first = [_track(options, t, course) for t in wrong[:TRIALS]] if is_tried else []
-            if first and all(first) and any(track.is_moved for track in first if track):
-                matches.setdefault(key, course)
-        if matches:
-            tracks = {key: [_track(options, t, c) for t in trials] for key, c in matches.items()}
-            found = _explanation(matches, tracks, trials)
-            is_clear = any(c.fault or _ending(tracks[key]) for key, c in matches.items())
-            if is_clear and (vague is None or (found and found.share > vague.share)):
+    model, vague = model_of(options), None
+    for integrator in _integrators(model, STARTS[start]):
+        follow = partial(_track, model._replace(integrator=integrator))
+        first = list(takewhile(bool, map(follow, wrong[:TRIALS])))
+        if len(first) == len(wrong[:TRIALS]) and any(track.is_moved for track in first if track):
+            tracks = [follow(trial) for trial in trials]
+            found = _explanation(integrator, tracks, trials)
+            if found and _ending(tracks):
                 return found
             vague = vague or found
     return vague
@@ -157,11 +149,11 @@ def stiffness_hint(
 ) -> Sentence | None:
     """Return that answers are right except where the system is stiff, None if they are not."""
     trials = [t for t in trials_of(options, probes, epsilon) if not is_indefinite(t.problem)]
-    right = [stiffness_of(t.problem) for t in trials if t.error <= IMPRECISE]
+    right = [s for t in trials if t.error <= IMPRECISE and (s := stiffness_of(t.problem)) > 0.0]
     wrong = [stiffness_of(t.problem) for t in trials if t.error > IMPRECISE]
     if not right or not wrong or max(right) >= min(wrong):
         return None
-    _, model = apply(options, trials[0].problem, StepModel(damper="none"))
+    model = model_of(options)
     is_linear = (model.integrator.method, model.integrator.iterations) == ("newton", 1)
     place = sentence(
         "the linear solver: its number of iterations, its end and, of conjugate gradients, α and β"
@@ -189,8 +181,9 @@ def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswe
     """Return the answer to a single step, or to the first of several."""
     problem = probe.problem.changed(steps=None)
     positions = probe.answers["positions"].reshape(-1, problem.count, 3)[0]
-    p, model = apply(options, problem, StepModel(damper="none"))
-    expected, allowed = predicted(p, model, positions), rounding(p, model, epsilon)
+    model = model_of(options)
+    expected = predicted(problem, model, positions)
+    allowed = rounding(problem, model, epsilon)
     if not expected:
         return StepAnswer(problem, positions, np.inf, 0.0)
     gap = float(np.abs(expected["positions"] - positions).max())
@@ -207,48 +200,35 @@ def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswe
 
 
 def _explanation(
-    courses: Mapping[str, FollowedMethod],
-    tracks: Mapping[str, Sequence[Track | None]],
-    trials: Sequence[StepAnswer],
+    integrator: Integrator, tracks: Sequence[Track | None], trials: Sequence[StepAnswer]
 ) -> Explanation | None:
-    """Return the courses, by keys, that have most answers among their iterates.
-
-    Their share is that of all answers or, if less, of the wrong answers.
-    """
-    wrong, shares = np.array([trial.is_wrong for trial in trials]), dict[str, float]()
-    for key, row in tracks.items():
-        pairs = zip(row, trials, strict=True)
-        hits = np.array([track is not None and not trial.is_unlike for track, trial in pairs])
-        shares[key] = min(hits.mean(), hits[wrong].mean())
-    share = float(max(shares.values()))
-    keys = [key for key in shares if shares[key] == share][:EXPLANATIONS]
-    words = [[_words(courses[key], tracks[key])] for key in keys]
-    return Explanation(tuple(keys), either(words), share, 0.0) if share >= LEAST_SHARE else None
+    """Return that answers are iterates; their share is that of all or, if less, of wrong ones."""
+    wrong, pairs = np.array([trial.is_wrong for trial in trials]), zip(tracks, trials, strict=True)
+    hits = np.array([track is not None and not trial.is_unlike for track, trial in pairs])
+    share = float(min(hits.mean(), hits[wrong].mean()))
+    code, message = _words(integrator, tracks)
+    key = coded_faults()[code].name
+    return Explanation((key,), message, share, 0.0) if share >= LEAST_SHARE else None
 
 
-def _words(course: FollowedMethod, tracks: Sequence[Track | None]) -> Sentence:
-    """Return the mistake of a course, and the test by which it ends early."""
+def _words(integrator: Integrator, tracks: Sequence[Track | None]) -> tuple[str, Sentence]:
+    """Return the code of iterations that end early, and the test by which they do."""
     early = [track for track in tracks if track is not None and track.is_early]
     ends, test = [len(track.residuals) - 1 for track in early], _ending(tracks)
     if test is None and min(ends) == max(ends):
         test = sentence("after {count} iterations", count=ends[0])
     elif test is None:
         test = sentence("after {low} to {high} iterations", low=min(ends), high=max(ends))
-    name = NAMES[course.integrator.method]
-    values = {"name": name, "test": test, "count": len(ends), "total": len(tracks)}
-    if course.integrator.method == "local_global" and set(ends) == {1}:
-        kept = with_code(KEPT_DIRECTIONS["code"], Sentence(KEPT_DIRECTIONS["sentence"], {}))
-        return sentence("{fault} This is so in {count} of {total} answers.", fault=kept, **values)
-    if course.fault is None:
-        ended = with_code(EARLY_END["code"], Sentence(EARLY_END["sentence"], {}))
-        return sentence(
-            "{fault} Those of {name} end {test}, and too early in {count} of {total} answers.",
-            fault=ended, **values,
-        )  # fmt: skip
-    return sentence(
-        "{fault} So the iterations of {name} do not converge in {count} of {total} answers: they "
-        "end {test}.", fault=course.fault.sentence, **values,
-    )  # fmt: skip
+    is_single = integrator.method == "local_global" and set(ends) == {1}
+    code = KEPT_DIRECTIONS if is_single else EARLY_END
+    values = {"fault": with_code(code, coded_faults()[code].sentence), "test": test}
+    values |= {"name": NAMES[integrator.method], "count": len(ends), "total": len(tracks)}
+    if is_single:
+        return code, sentence("{fault} This is so in {count} of {total} answers.", **values)
+    return code, sentence(
+        "{fault} Those of {name} end {test}, and too early in {count} of {total} answers.",
+        **values,
+    )
 
 
 def _ending(tracks: Sequence[Track | None]) -> Sentence | None:
@@ -260,58 +240,27 @@ def _ending(tracks: Sequence[Track | None]) -> Sentence | None:
     return ending_test(TESTS, [track._asdict() for track in followed], is_early)
 
 
-def _delay(fault: Option) -> Any:
-    """Return the part of a fault that may delay Newton's method: itself, or its integrator."""
-    integrator = fault.fields.get("integrator")
-    if integrator is not None:
-        integrator = integrator._replace(iterations=1, start="x_n")
-        is_other = integrator.method == "newton" and integrator not in RIGHT_NEWTONS
-        return integrator if is_other else None
-    is_meant = fault.aspect == "matrix" or fault.part in ("forces", "matrix", "energy")
-    return id(fault) if is_meant and "dv" not in fault.fields else None
-
-
-DELAYS = {_delay(fault): fault for fault in reversed((*FOLLOWED_FAULTS, *STEP_FAULTS))}
-DELAYS.pop(None)
-# Wrong β of conjugate gradients, and matrices that are not symmetric: they do not converge.
-LINEAR = [
-    fault
-    for fault in (*FOLLOWED_FAULTS, *STEP_FAULTS)
-    if fault.fields.get("matrix", RIGHT_MATRIX).is_skew
-    or fault.fields.get("integrator", RIGHT_NEWTONS[0]).method == "linear"
-]
-FACTORISATIONS = [fault for fault in STEP_FAULTS if fault.aspect == "factorisation"]
-
-
-def _courses(model: StepModel, starts: Sequence[str]) -> Iterator[FollowedMethod]:
-    """Yield the methods that a model may stand for, right and with mistakes."""
-    method, right = model.integrator.method, model.integrator._replace(method="linear")
-    if method == "newton" and right.iterations == 1:
-        for fault, scale, start in product([None, *LINEAR], _TABLE["scales"], ("x_n", "y")):
-            beta = fault.fields.get("integrator", right).beta if fault else right.beta
-            yield FollowedMethod(right._replace(start=start, scale=scale, beta=beta), fault)
-        yield from (FollowedMethod(model.integrator, fault) for fault in FACTORISATIONS)
+def _integrators(model: StepModel, starts: Sequence[str]) -> Iterator[Integrator]:
+    """Yield the methods with iterations that a model may stand for."""
+    method = model.integrator.method
+    if method == "newton" and model.integrator.iterations == 1:
+        for scale, start in product(SCALES, ("x_n", "y")):
+            yield Integrator("linear", start, hessian=scale)
         return
-    if method in ("local_global", "converged"):
-        yield from (FollowedMethod(Integrator("local_global", start)) for start in starts)
-    is_newton = method in ("newton", "converged")
-    for start, decrease in product(starts if is_newton else (), (DECREASE, None)):
-        for newton in RIGHT_NEWTONS:
-            yield FollowedMethod(newton._replace(start=start, decrease=decrease))
-        for fault in DELAYS.values():
-            changed = fault.fields.get("integrator", RIGHT_NEWTONS[0])._replace(start=start)
-            if changed.decrease is None:
-                changed = changed._replace(decrease=decrease)
-            if decrease is not None or (fault.part != "energy" and changed.decrease is None):
-                yield FollowedMethod(changed, fault)
+    if method == "converged" or (method == "local_global" and model.integrator.iterations > 1):
+        yield from (Integrator("local_global", start) for start in starts)
+    if method in ("newton", "converged"):
+        for start, is_safeguarded in product(starts, (True, False)):
+            for hessian in ("exact", "gauss", "projected"):
+                yield Integrator("newton", start, 1, hessian, is_safeguarded)
 
 
-def _track(options: Sequence[Option], trial: StepAnswer, course: FollowedMethod) -> Track | None:
+def _track(model: StepModel, trial: StepAnswer) -> Track | None:
     """Return the iterates up to an answer, None if it is not among them."""
-    equation = _equation(course, options, trial.problem)
-    is_slow = course.integrator.method != "newton"
+    equation = first_equation(trial.problem, model)
+    is_slow = model.integrator.method != "newton"
     limit = MAX_ITERATIONS + 10 * trial.positions.size * is_slow
-    start = np.where(equation.free, equation.starts[course.integrator.start], equation.start.x)
+    start = np.where(equation.free, equation.starts[model.integrator.start], equation.start.x)
     xs = list[FloatArray]()
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         iterates, residual = _iteration(equation, start)
@@ -338,52 +287,42 @@ def _track(options: Sequence[Option], trial: StepAnswer, course: FollowedMethod)
     return None
 
 
-def _equation(
-    course: FollowedMethod, options: Sequence[Option], problem: SpringProblem
-) -> StepEquation:
-    """Return the equation of a course; its line search may compare another energy."""
-    usual, model = p, _ = apply(options, problem, StepModel(damper="none"))
-    if course.fault is not None:
-        part = course.fault.part
-        fault = course.fault._replace(part=part.removeprefix("energy"))
-        p, model = apply([*options, fault], problem, StepModel(damper="none"))
-        if part in ("energy", "forces"):
-            p = usual.changed(merit=p) if part == "energy" else p.changed(merit=usual)
-    return first_equation(p, model._replace(integrator=course.integrator))
-
-
 def _iteration(
     equation: StepEquation, start: FloatArray
 ) -> tuple[Iterator[FloatArray], Callable[[FloatArray], FloatArray]]:
     """Return the iterates from a start, and the residuals that they leave."""
     p, model, x_n, _, _, _ = equation.start
-    free, integrator = equation.free.ravel(), model.integrator
-    if integrator.method != "linear":
-        return ITERATES[integrator.method](equation, start), equation.free_gradient
-    A, right, drift = equation.linear_system(x_n, x_n, integrator.hessian)
-    base = np.where(equation.free, x_n + drift, x_n)
-    usual = StepEquation(equation.start._replace(model=model._replace(matrix=RIGHT_MATRIX)))
-    diagonal = usual.matrix(x_n, integrator.hessian).diagonal()[free]
-    A, b = A[np.ix_(free, free)], right.reshape(-1, 1)[free]
-    particle = np.arange(len(free))[free] // 3
-    diagonals = {"A": A, "M": p.inertia_diagonal[free], "diagonal": diagonal,
-                 "blocks": A * (particle[:, None] == particle)}  # fmt: skip
-    scale = evaluate(integrator.scale, p, diagonals)
-    is_matrix = scale.ndim == 2
-    scale = scale if is_matrix else scale[:, None]
-    root = np.linalg.cholesky(scale) if is_matrix else scale**0.5
-
-    def beta(before: FloatArray, after: FloatArray) -> Any:
-        return evaluate(integrator.beta, p, {"before": before, "after": after})
+    if model.integrator.method != "linear":
+        return ITERATES[model.integrator.method](equation, start), equation.free_gradient
+    free = np.repeat(equation.free.ravel(), 3)
+    A = equation.matrix(x_n, "exact")[np.ix_(free, free)]
+    b = -equation.gradient(x_n).ravel()[free]
+    scale = SCALES[model.integrator.hessian](A, np.repeat(p.masses, 3)[free])
+    root = np.linalg.cholesky(scale)
 
     def residual(x: FloatArray) -> FloatArray:
-        left = b - A @ (x - base).reshape(-1, 1)[free]
-        return np.linalg.solve(root, left) if is_matrix else left / root
+        return np.asarray(np.linalg.solve(root, b - A @ (x - x_n).ravel()[free]))
 
     def placed(solution: FloatArray) -> FloatArray:
         step = np.zeros(len(free))
-        step[free] = solution[:, 0]
-        return base + step.reshape(x_n.shape)
+        step[free] = solution
+        return x_n + step.reshape(x_n.shape)
 
-    guess = (start - base).reshape(-1, 1)[free]
-    return map(placed, conjugate_gradients(A, b, guess, scale, beta)), residual
+    guess = (start - x_n).ravel()[free]
+    return map(placed, _conjugate_gradients(A, b, guess, scale)), residual
+
+
+def _conjugate_gradients(
+    A: FloatArray, b: FloatArray, x: FloatArray, scale: FloatArray
+) -> Iterator[FloatArray]:
+    """Yield the iterates of conjugate gradients that a matrix preconditions."""
+    residual, direction, before = b - A @ x, 0.0 * b, 1.0
+    while True:
+        yield x
+        z = np.linalg.solve(scale, residual)
+        after = float(residual @ z)
+        direction = z + after / before * direction if direction.any() else z
+        image = A @ direction
+        curvature = float(direction @ image)  # negative where the matrix is indefinite
+        rate = after / curvature if curvature else 0.0
+        x, residual, before = x + rate * direction, residual - rate * image, after

@@ -277,7 +277,7 @@ def momentum(context: StepContext) -> Finding | None:
     """Return how far the centre of mass is from where gravity takes it, without pins."""
     p, x, model = context.problem, context.answers.get("positions"), context.model
     method = model.integrator.method
-    if x is None or len(p.pinned) or p.steps or method == "descent" or model.scaling != 1.0:
+    if x is None or len(p.pinned) or p.steps or model.scaling != 1.0:
         return None
     if model.damper in ("diagonal", "blocks"):
         return None  # each end has its own share of a damper there

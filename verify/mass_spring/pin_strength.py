@@ -12,7 +12,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence
 
-from .options import Option
+from .honest import Option
 from .problem import SpringProblem
 
 # The honest pins that have a strength, by the first word of `StepModel.pins`: each gets the words
@@ -41,7 +41,7 @@ def _with_strength(pattern: Option, kind: str, strength: float) -> Option:
     """Return a choice of pins with another strength."""
     digits = f"{strength:.4g}".replace("e+0", "e").replace("e+", "e")
     message, pins = Sentence(pattern.sentence.template, {"strength": digits}), f"{kind} {digits}"
-    return pattern._replace(key=f"pins {pins}", sentence=message, fields={"pins": pins}, rare=False)
+    return pattern._replace(sentence=message, fields={"pins": pins})
 
 
 def _strength(kind: str, answers: Sequence[PinnedAnswer]) -> float | None:

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import msgspec
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
 from plumbob.reference.explicit import symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.mass_spring import State
@@ -29,11 +28,10 @@ from ..judgement import (
 from ..laws import digits, hints_of, judge_case
 from . import laws
 from .cases import task_cases, trace_of
-from .honest import ITERATIVE, SYMPLECTIC, honest_domains
+from .honest import ITERATIVE, SYMPLECTIC, Option, model_of
 from .laws import SOLVED, StepContext, rounding
 from .model import StepModel, predicted
-from .model_search import ModelMatch, ModelSearch, Probe, fields_of, probes_of
-from .options import ASPECTS, Option, apply
+from .model_search import ModelSearch, Probe, honest_options, probes_of
 from .problem import SpringProblem, problem_of, state_of, system_of
 
 LAWS: tuple[Callable[[StepContext], Finding | None], ...] = (
@@ -55,15 +53,18 @@ class Stepping(NamedTuple):
         """Hold answers against the step that is declared, or that an honest program makes."""
         problems = problems_of(exchanges, greeting)
         search = ModelSearch(telling_probes(exchanges, problems), greeting)
-        matches = search.run(probes_of(exchanges, problems, every=True))
-        judgements = _judge_all(exchanges, problems, greeting, matches)
+        match = search.run(probes_of(exchanges, problems, every=True))
+        judgements = _judge_all(exchanges, problems, greeting, match)
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-        step, hints = greeting.step, hints_of(judgements)
-        behaviour = (
-            step_behaviour(honest_options(matches, step), step, is_wrong) if matches else None
-        )
-        diagnosis = Diagnosis((), behaviour, first_broken_step(judgements), hints)
-        diagnosis = replace(diagnosis, is_double=search.is_double())
+        options = honest_options(match, greeting)
+        behaviour = step_behaviour(options, greeting.step, is_wrong) if match else None
+        first, hints = first_broken_step(judgements), hints_of(judgements)
+        if repeats(judgements, 1.0):
+            first = sentence(
+                "Positions are those of the request in all its answers: nothing moves. Answer the "
+                "state at the end of the step."
+            )
+        diagnosis = Diagnosis((), behaviour, first, hints, is_double=search.is_double())
         return TaskReport(self.TASK, "", judgements, diagnosis)
 
 
@@ -79,11 +80,11 @@ def _judge_all(
     exchanges: Sequence[Exchange],
     problems: Mapping[str, SpringProblem],
     greeting: Greeting,
-    matches: Sequence[ModelMatch],
+    match: Sequence[Option],
 ) -> list[CaseJudgement]:
     """Return the judgements of all answers, by the step that is declared or recognised."""
-    options = honest_options(matches, greeting.step)
-    recognised = greeting.step.method is not None or bool(matches)
+    options = honest_options(match, greeting)
+    recognised = greeting.step.method is not None or bool(match)
     return [
         _judge_case(
             exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
@@ -96,42 +97,16 @@ def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, 
     """Return the problem of each case; a solver that goes on starts from its own answer."""
     by_name = {exchange.case.name: exchange for exchange in exchanges}
     problems: dict[str, SpringProblem] = {}
-    ends: dict[
-        int, tuple[FloatArray, FloatArray]
-    ] = {}  # the last states, by the number of particles
     for name, exchange in by_name.items():
         before = by_name.get(exchange.case.follows)
-        h_before = before.case.inputs["h"] if before is not None else None
         inputs = dict(exchange.case.inputs)
         if greeting.system.continues and before is not None and isinstance(before.answer, Answer):
             answers = before.answer.values
             for state in {"positions", "velocities"} & answers.keys():
                 frames = answers[state]
                 inputs[state] = frames.reshape(-1, *frames.shape[-2:])[-1]
-        p = problems[name] = problem_of(inputs, h_before)
-        problems[name] = p.changed(before=ends.get(p.count))
-        outputs = exchange.answer.values if isinstance(exchange.answer, Answer) else {}
-        if {"positions", "velocities"} <= outputs.keys():
-            x, v = (
-                outputs[state].reshape(-1, p.count, 3)[-1] for state in ("positions", "velocities")
-            )
-            ends[p.count] = x, v
+        problems[name] = problem_of(inputs)
     return problems
-
-
-def honest_options(matches: Sequence[ModelMatch], step: Step) -> tuple[Option, ...]:
-    """Return the recognised choices of a solver, its faults replaced by declared choices."""
-    options, faults = matches[0] if matches else ((), ())
-    wrong = {fault.aspect for fault in faults}
-    recognised = {option.aspect: option for option in options if option.aspect not in wrong}
-    choices = honest_domains(step)
-    usual = {aspect: choices[aspect][0][0] for aspect in ASPECTS} | recognised
-    if usual["integrator"].fields["integrator"].explicit:
-        for aspect, name in (("damper", "explicit"), ("velocity", "separate")):
-            if aspect not in recognised:
-                fits = (o for o, cost in choices[aspect] if not cost and o.fields[aspect] == name)
-                usual[aspect] = next(fits, usual[aspect])
-    return tuple(usual[aspect] for aspect in ASPECTS)
 
 
 def describe_model(options: Sequence[Option]) -> Sentence:
@@ -158,7 +133,7 @@ def declaration_of(options: Sequence[Option]) -> str:
         "iterations": integrator.iterations if is_iterative else None,
         "substeps": fields["substeps"],
         "damper": fields["damper"],
-        "pins": {"springs": "penalty", "falling": "heavy", "weightless": "heavy"}.get(pins, pins),
+        "pins": {"springs": "penalty", "weightless": "heavy"}.get(pins, pins),
         "velocity": fields["velocity"],
     }
     if fields["scaling"] != 1.0:
@@ -184,7 +159,7 @@ def _judge_case(
     case, answer = exchange.case, exchange.answer
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {})
-    _, model = apply(options, p, StepModel())
+    model = model_of(options)
     expected, positions = predicted(p, model), answer.values.get("positions")
     context = StepContext(
         p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
@@ -239,7 +214,7 @@ def _reference_step(p: SpringProblem, model: StepModel) -> State:
 def step_behaviour(options: Sequence[Option], step: Step, is_wrong: bool) -> Sentence | None:
     """Return the honest model that answers are of, None if it is the one that is declared."""
     is_open = _leaves_open(step, options)
-    integrator = fields_of({option.aspect: option for option in options})["integrator"]
+    integrator = model_of(options).integrator
     if not is_open and integrator.hessian == "exact":
         return None
     declaration = declaration_of(options) if is_open and not is_wrong else ""

@@ -48,10 +48,11 @@ OF_STEPS = ("k l/h", "k r/h", "c (l' - l)/h")
 class SpringCase:
     """A request and its answer, as arrays."""
 
-    def __init__(self, judgement: CaseJudgement, epsilon: float) -> None:
+    def __init__(self, judgement: CaseJudgement, epsilon: float, is_damped: bool = True) -> None:
         assert isinstance(judgement.answer, Answer)
         self.name, outputs = judgement.case.name, judgement.answer.values
-        p = self.problem = problem_of(judgement.case.inputs)
+        p = problem_of(judgement.case.inputs)
+        p = self.problem = p if is_damped else p.changed(dampings=0.0 * p.dampings)
         self.x, self.v, self.h = p.positions, p.velocities, p.h or 1.0
         self.masses, self.gravity = p.masses[:, None], p.gravity
         self.free = np.setdiff1d(np.arange(p.count), p.pinned)

@@ -16,6 +16,7 @@ from plumbob.text.sentence import Sentence, sentence
 from ..judgement import CaseJudgement
 from .equalities import DIFFERENT
 from .fits import Term, fit, formula, is_sum
+from .linearised import linearised_pulls
 from .pulls import (
     MAX_ROUNDING,
     OF_STEPS,
@@ -38,10 +39,16 @@ KINDS = ("damped_spring", "compressed_spring")
 
 
 def spring_evidence(
-    judgements: Sequence[CaseJudgement], epsilon: float, sound: Set[str] = frozenset()
+    judgements: Sequence[CaseJudgement],
+    epsilon: float,
+    sound: Set[str] = frozenset(),
+    is_damped: bool = True,
 ) -> Findings:
-    """Return what answers show; `sound` are the names of the cases with a right verdict."""
-    cases = [SpringCase(judgement, epsilon) for judgement in judgements]
+    """Return what answers show; `sound` are the names of the cases with a right verdict.
+
+    Dampers count as none unless the step is damped.
+    """
+    cases = [SpringCase(judgement, epsilon, is_damped) for judgement in judgements]
     cases = [case for case in cases if _is_finite(case)]
     evidence = Findings({}, [], [])
     solved: dict[str, list[Pulls]] = defaultdict(list)
@@ -61,6 +68,9 @@ def spring_evidence(
         return evidence  # what equations differ from the usual are honest choices
     if len(solved[name]) >= MIN_CASES:
         _add_pulls(name, solved[name], evidence)
+    linearised = linearised_pulls(cases) if not evidence.statements else None
+    if linearised is not None and not linearised[1]:
+        evidence.statements.append(_of_fit(linearised[0]))
     _add_flights([case for case in cases if not case.acting.any()], evidence)
     _add_velocities(cases, evidence)
     return evidence

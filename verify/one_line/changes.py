@@ -28,6 +28,9 @@ TOLERANCE, TOLERANCES = 1e-5, [10.0**-i for i in range(1, 11)]
 PARTS = {"loop": ("1:", ":-1", ":2", ":3", ":4", ":5", ":10"), "direction": ("::-1",)}
 NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
+# The name of a number that answers tell.
+CONSTANT = "_constant"
+
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
 # The kind, the line in the place of a statement, and the statements of its block.
 Rearrangement = tuple[str, str, list[ast.stmt]]
@@ -66,6 +69,15 @@ def of_expression(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
         yield from (("name", parsed(other)) for other in _of_one_form(text, scope))
         yield from _conversions(text, parent, scope)
         yield from _lost_factors(node, scope)
+
+
+def of_constant(node: Any, parent: ast.AST, scope: Scope) -> Iterator[Change]:
+    """Yield an expression times a number, and with a number added."""
+    text = ast.unparse(node)
+    is_number = scope.shapes.get(text, "").startswith("(") or isinstance(node, ast.Constant)
+    if is_number and not isinstance(parent, ast.Subscript | ast.Call | ast.Dict | ast.Return):
+        yield "factor", parsed(f"{CONSTANT} * ({text})")
+        yield "number", parsed(f"{CONSTANT} + ({text})")
 
 
 def _operands(node: Any) -> Iterator[Change]:

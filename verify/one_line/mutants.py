@@ -15,7 +15,17 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from ..task import TASKS
-from .changes import MODULES, Scope, header, is_idle, of_expression, of_statement, parsed
+from .changes import (
+    MODULES,
+    Change,
+    Scope,
+    header,
+    is_idle,
+    of_constant,
+    of_expression,
+    of_statement,
+    parsed,
+)
 
 T = TypeVar("T")
 FILE, PASS = "right program", "_pass"
@@ -111,6 +121,11 @@ class Program:
         exec(_compiled(ast.parse(text)), self.names, names)
         return Mutant(kind, function, right, wrong, names[function])
 
+    @property
+    def texts(self) -> dict[str, str]:
+        """The sources of all functions."""
+        return {part.name: ast.unparse(part) for part in self._functions}
+
     @contextmanager
     def within(self, passes: int) -> Iterator[None]:
         """Run the program, or stop it long after the passes that the right program takes."""
@@ -171,31 +186,46 @@ class Program:
             text = ast.unparse(function)
             if function.name in self._scopes and text not in functions:
                 functions.add(text)
-                yield from self._of_block(function, function)
+                yield from self._of_block(function, function, of_expression)
 
-    def _of_block(self, function: ast.FunctionDef, block: Any) -> Iterator[Mutant]:
+    def with_constants(self) -> Iterator[Mutant]:
+        """Yield each expression with a factor or a term `CONSTANT`, whose value `names` holds."""
+        for function in self._functions:
+            if function.name in self._scopes:
+                yield from self._of_block(function, function, of_constant)
+
+    def _of_block(
+        self, function: ast.FunctionDef, block: Any, changes: Callable[..., Iterator[Change]]
+    ) -> Iterator[Mutant]:
         """Yield the changes of the statements of a block, and of the statements within them."""
         for name in ("body", "orelse"):
             statements = getattr(block, name, [])
             for i, statement in enumerate(statements):
                 if isinstance(statement, ast.Expr) or not self._is_executed(statement):
                     continue  # a docstring, the count of passes, or without effect
-                yield from self._of_expressions(function, statement)
-                for kind, wrong, changed in of_statement(statements, i):
+                yield from self._of_expressions(function, statement, changes)
+                for kind, wrong, changed in (
+                    of_statement(statements, i) if changes is of_expression else ()
+                ):
                     change = kind, header(statement), wrong
                     yield from self._mutant(function, change, (block, name), changed)
-                yield from self._of_block(function, statement)
+                yield from self._of_block(function, statement, changes)
 
     def _is_executed(self, statement: Any) -> bool:
         end = statement.body[0].lineno if hasattr(statement, "body") else statement.end_lineno + 1
         lines = range(statement.lineno, max(end, statement.lineno + 1))
         return is_idle(statement) or not self._lines.isdisjoint(lines)
 
-    def _of_expressions(self, function: ast.FunctionDef, statement: ast.stmt) -> Iterator[Mutant]:
+    def _of_expressions(
+        self,
+        function: ast.FunctionDef,
+        statement: ast.stmt,
+        changes: Callable[..., Iterator[Change]],
+    ) -> Iterator[Mutant]:
         """Yield the changes of a statement's expressions."""
         right, scope = header(statement), self._scopes[function.name]
         for parent, field, node in list(_expressions(statement)):
-            for kind, new in of_expression(node, parent, scope):
+            for kind, new in changes(node, parent, scope):
                 with _replaced(parent, field, new):
                     wrong = header(statement)
                 if wrong != right:

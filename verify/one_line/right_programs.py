@@ -1,8 +1,9 @@
 """The right programs of a task, known faults in their lines, and the comparable part of answers."""
 
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,8 @@ KINDS = list(FAULTS)
 FOUNDATIONS = BUILDS_ON | {tool_steps.TASK: (*BUILDS_ON["robot_track"], "robot_track")}
 # The declaration of programs of Jacobian methods.
 JACOBIAN = '"methods": ["jacobian"]'
+# Fields of a declared step that constants of a program may have.
+CHOICES = ("method", "order", "start", "iterations", "substeps", "damper")
 # Faults of these families are named in other ways than by the lines of a program.
 SELF_NAMED = ("LINE", "STATE")
 
@@ -63,18 +66,28 @@ def is_of(program: str, task: str, method: str) -> bool:
 def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
     """Yield the right programs of a task that have its method and the declared step."""
     for name, entry in PROGRAMS.items():
-        if not is_of(name, task, method):
+        if not is_of(name, task, method) or not entry.get("searched", True):
             continue
         program = Program(source_of(name))
         own = program.names.get("PLUMBOB", {}).get("step", {})
-        choices = {field.upper() for field in own} & program.names.keys()
-        declared = {field: getattr(step, field) for field in own}
-        program.choose({c: v for c in choices if (v := declared[c.lower()]) is not None})
-        if entry.get("searched", True) and all(
-            value in (None, own[field]) or field.upper() in choices
-            for field, value in declared.items()
-        ):
-            yield program
+        choices = {field for field in CHOICES if field.upper() in program.names}
+        declared = {field: getattr(step, field) for field in (*own, *choices)}
+        is_fixed = all(declared[field] in (None, own[field]) for field in own.keys() - choices)
+        methods = (None, own.get("method"), *entry.get("methods", ()))
+        if is_fixed and declared.get("method") in methods:
+            chosen = {f.upper(): declared[f] for f in choices if declared[f] is not None}
+            yield from _in_undeclared_choices(program, chosen, entry.get("undeclared", {}))
+
+
+def _in_undeclared_choices(
+    program: Program, chosen: Mapping[str, Any], undeclared: Mapping[str, Sequence[Any]]
+) -> Iterator[Program]:
+    """Yield a program with each combination of the choices that a greeting leaves open."""
+    values = {name: each for name, each in undeclared.items() if name not in chosen}
+    for combination in product(*values.values()):
+        variant = Program(program.source)
+        variant.choose({**dict(zip(values, combination, strict=True)), **chosen})
+        yield variant
 
 
 def comparable(exchange: Exchange) -> Exchange:

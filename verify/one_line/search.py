@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from itertools import product, takewhile
+from itertools import combinations, islice, takewhile
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
-from ..dictionary.entry import Entry
+from ..dictionary.entry import Entry, Pair
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..dictionary.requests import TASKS
 from ..explain import MORE, Variant, explain, together
@@ -28,7 +28,8 @@ from ..kinematics.limits import READINGS
 from ..kinematics.sweeps import ROUNDED, PoseTrial
 from ..laws import LAWS
 from ..precision import judging_greeting
-from . import tool_steps
+from . import constants, tool_steps
+from .constants import text_of, with_number
 from .fitted import fitted, is_fitted
 from .mutants import Mutant, Program
 from .right_programs import FAULTS, KINDS, answer_of, comparable, faults_in, programs_of
@@ -48,13 +49,24 @@ MIN_SHARE = 0.75
 MAX_PASSES, OF_CURVES = 200, 2000
 # But not if they go as often through them for the shortest case, as a constant number of sweeps.
 LONGER = 3
+# The changes of which each two are tried at once, in each program.
+MAX_IN_PAIRS = 12
 # No further right program is changed after so many changes, of half a millisecond each; where
 # changes are looked up, few are left that only a search finds.
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
+# Of a right step, which takes longer.
+MAX_MUTANTS_OF_STEPS = 3_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
-IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics")
+OF_STEPS = ("mass_spring_step", "mass_spring_motion")
+IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics", *OF_STEPS)
 # The functions of programs with fitted constants that forward kinematics shows to be right.
 FOUNDATIONS = ("multiply", "conjugate", "rotate", "kinematics")
+# The tasks whose answers tell numbers: they take no iterations.
+WITH_NUMBERS = ("mass_spring_forces", "energy", *OF_STEPS)
+# Where a right answer to all requests of the dictionary leaves known faults of rare cases alone.
+RARE_ELSEWHERE = ("mass_spring_forces", "energy")
+# Of right steps, so many that come nearest are tried with known faults, and with changed lines.
+NEAREST_KNOWN, NEAREST = 8, 2
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
@@ -194,6 +206,7 @@ def changed_lines(
     ]
     best = tuple[Explanation, ...]()
     if proposals is not None:
+        is_known |= not proposals.is_wrong and report.task in RARE_ELSEWHERE
         if proposals.sweeps is not None:
             compared = _with_sweeps(compared, proposals.sweeps)
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
@@ -204,7 +217,13 @@ def changed_lines(
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
     if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
         return ()
-    best = best or _of_programs(programs, report, compared, tolerance, is_known)
+    if not best:
+        best = _of_programs(programs, report, compared, tolerance, is_known)
+    if report.task in WITH_NUMBERS and not best and not (doubtful or is_known):
+        names = IN_DICTIONARY.get(report.task, ())
+        programs = programs or [Program(source_of(name)) for name in names]
+        for program in programs[: 1 if report.task in OF_STEPS else None]:
+            best = best or _of_numbers(program, report, compared, tolerance)
     return best if best and best[0].share >= MIN_SHARE else ()
 
 
@@ -215,28 +234,90 @@ def _of_programs(
     tolerance: float,
     is_known: bool,
 ) -> tuple[Explanation, ...]:
-    """Return the fault or changed line of some programs that gives most answers."""
+    """Return the fault or changed line of some programs that gives most answers.
+
+    Of many right steps those are tried that come nearest, all known faults first.
+    """
     best, functions = tuple[Explanation, ...](), set[str]()
     if report.task in tool_steps.SOLVES:
         functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
     most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
     most = tool_steps.MAX_MUTANTS.get(report.task, most)
-    # Motions take too long for changes of all lines.
-    lines = [] if is_known or report.task == tool_steps.MOTIONS else [functions]
-    # Known faults of all programs with fitted constants first: their lines take seconds each.
-    is_of_fitted = any(map(is_fitted, programs))
-    known = [None] if is_of_fitted or not lines else []
-    for changed, program in product([*known, *lines], programs):
-        if changed is not None and is_of_fitted and best and best[0].share >= MIN_SHARE:
+    for program, known_alone in _trials(programs, report, compared, is_known):
+        if not known_alone and is_fitted(program) and best and best[0].share >= MIN_SHARE:
             break
         if report.task in IN_CONVENTIONS:
             functions.clear()
+        changed = None if known_alone else functions
         explanations = _of_program(program, report, compared, tolerance, changed)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > most:
             break
     return best
+
+
+def _trials(
+    programs: Sequence[Program],
+    report: TaskReport,
+    compared: Sequence[Exchange],
+    is_known: bool,
+) -> list[tuple[Program, bool]]:
+    """Return programs in the order of their trials, and whether known faults alone are tried.
+
+    Motions take too long for changes of all lines.
+    """
+    is_known |= report.task == tool_steps.MOTIONS
+    if report.task in OF_STEPS:
+        nearest = _nearest(programs, report, compared)
+        first = [(program, True) for program in nearest[:NEAREST_KNOWN]]
+        return first + [(program, is_known) for program in nearest[:NEAREST]]
+    # The lines of programs with fitted constants take seconds each.
+    first = [(program, True) for program in programs if is_fitted(program) and not is_known]
+    return first + [(program, is_known) for program in programs]
+
+
+def _of_numbers(
+    program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
+) -> tuple[Explanation, ...]:
+    """Return the changes of a program by a number, which answers tell, as `_of_program` does."""
+    run = partial(answer_of, program, report.method)
+    different, same, passes = _compare(program, run, compared, tolerance)
+    if len(different) < MIN_DIFFERENT:
+        return ()
+    program.observe(partial(run, different[0].case))
+    mutants = dict[str, Mutant]()
+
+    def variants() -> Iterator[Variant]:
+        for mutant, number in constants.fitted(program, run, different, passes, tolerance):
+            key = str(len(mutants))
+            mutants[key] = text_of(mutant, number)
+            predict = partial(with_number, program, mutant, number, passes, run)
+            yield Variant((key,), predict, is_special=True)
+
+    telling = _telling(different, same)
+    return explain(
+        variants(), telling, lambda _: tolerance, partial(_describe, mutants), _trial(report)
+    )[0]
+
+
+def _nearest(
+    programs: Sequence[Program], report: TaskReport, compared: Sequence[Exchange]
+) -> list[Program]:
+    """Return programs, those first that give most answers, then those that come nearest."""
+
+    def score(program: Program) -> tuple[int, float]:
+        gaps = []
+        for exchange in compared:
+            assert isinstance(exchange.answer, Answer)
+            try:
+                values = answer_of(program, report.method, exchange.case)
+                gaps.append(difference(values, exchange.answer.values))
+            except ArithmeticError:
+                gaps.append(np.inf)
+        return -sum(gap <= TOLERANCE["single"] for gap in gaps), float(np.median(gaps))
+
+    return sorted(programs, key=score)
 
 
 def _gives(
@@ -298,7 +379,8 @@ def _of_program(
         program.observe(partial(run, different[0].case))
         if is_fitted(program):
             functions.update(map(program.text_of, FOUNDATIONS))
-        for number, mutant in enumerate(program.mutants(functions)):
+        limit = MAX_MUTANTS_OF_STEPS if report.task in OF_STEPS else None
+        for number, mutant in enumerate(islice(program.mutants(functions), limit)):
             mutants[str(number)] = mutant
             predict = partial(_changed_answer, program, mutant, passes, run)
             yield Variant((str(number),), predict, is_special=True)
@@ -323,17 +405,26 @@ def _of_entries(
     by_program = dict[str, list[Entry]]()
     for entry in entries:
         by_program.setdefault(entry.program, []).append(entry)
-    for name, changes in by_program.items():
-        explanations = _of_changes(Program(source_of(name)), changes, report, compared, tolerance)
-        best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
-        if best and best[0].share == 1.0:
-            break
+    for kind in (list, _pairs):
+        for name, changes in by_program.items():
+            explanations = _of_changes(
+                Program(source_of(name)), kind(changes), report, compared, tolerance
+            )
+            best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
+            if best and best[0].share == 1.0:
+                return best
     return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _pairs(entries: Sequence[Entry]) -> list[Pair]:
+    """Return two changes at once, of the likeliest changes that requests propose."""
+    single = [entry for entry in entries if len(entry.codes) < 2]
+    return [Pair(*pair) for pair in combinations(single[:MAX_IN_PAIRS], 2)]
 
 
 def _of_changes(
     program: Program,
-    entries: Sequence[Entry],
+    entries: Sequence[Entry | Pair],
     report: TaskReport,
     compared: Sequence[Exchange],
     tolerance: float,
@@ -343,40 +434,68 @@ def _of_changes(
     different, same, passes = _compare(program, run, compared, tolerance)
     if not different:
         return ()
-    ordered = sorted(entries, key=lambda entry: (max(len(entry.codes), 1), not entry.codes))
-    changes = dict[str, Entry]()
+    ordered = sorted(map(_parts, entries), key=lambda parts: (_count(parts), not parts[0].codes))
+    changes = dict[str, tuple[Entry, ...]]()
 
     def variants() -> Iterator[Variant]:
-        for number, entry in enumerate(ordered):
-            if entry.codes or len(different) >= MIN_DIFFERENT:
-                faults = tuple(coded_faults()[code].name for code in entry.codes) or (str(number),)
-                changes[" + ".join(faults)] = entry
+        for number, parts in enumerate(ordered):
+            if parts[0].codes or len(different) >= MIN_DIFFERENT:
+                faults = tuple(
+                    name for place, part in enumerate(parts) for name in _names(part, number, place)
+                )
+                changes[" + ".join(faults)] = parts
+                entry = parts[0] if len(parts) == 1 else Pair(*parts)
                 with suppress(SyntaxError, ValueError):
-                    predict = _answer_of_entry(entry, program, report, compared, passes)
-                    yield Variant(faults, predict, is_special=not entry.codes)
+                    predict = _answer_of_change(entry, program, report, compared, passes)
+                    yield Variant(faults, predict, is_special=not parts[0].codes)
 
     def describe(keys: Sequence[str]) -> Sentence:
-        if not changes[keys[0]].codes:
-            return _describe(changes, keys, changes[keys[0]].equal_count)
-        faults = [coded_faults()[code] for code in changes[keys[0]].codes]
-        return together([with_code(fault.code, fault.sentence) for fault in faults])
+        parts = changes[keys[0]]
+        if len(parts) == 1 and not parts[0].codes:
+            others = {key: changes[key][0] for key in keys if len(changes[key]) == 1}
+            return _describe(others, list(others), parts[0].equal_count)
+        return together([words for part in parts for words in _sentences_of(part)])
 
     return explain(variants(), _telling(different, same), lambda _: tolerance, describe,
                    _trial(report))[0]  # fmt: skip
 
 
-def _answer_of_entry(
-    entry: Entry,
+def _parts(change: Entry | Pair) -> tuple[Entry, ...]:
+    return (change.first, change.second) if isinstance(change, Pair) else (change,)
+
+
+def _count(parts: Sequence[Entry]) -> int:
+    """Return the number of mistakes."""
+    return sum(max(len(part.codes), 1) for part in parts)
+
+
+def _names(entry: Entry, number: int, place: int) -> list[str]:
+    """Return the keys of known faults, or a key of a changed line."""
+    return [coded_faults()[code].name for code in entry.codes] or [f"{number}.{place}"]
+
+
+def _sentences_of(entry: Entry) -> list[Sentence]:
+    """Return the sentences of known faults, or that of a changed line."""
+    faults = [coded_faults()[code] for code in entry.codes]
+    if faults:
+        return [with_code(fault.code, fault.sentence) for fault in faults]
+    return [_describe({"": entry}, [""], entry.equal_count)]
+
+
+def _answer_of_change(
+    change: Entry | Pair,
     program: Program,
     report: TaskReport,
     compared: Sequence[Exchange],
     passes: Mapping[str, int],
 ) -> Callable[[Case], Mapping[str, Any]]:
-    """Return the function that answers as an entry's change of a program."""
-    if entry.codes:
-        wrong = entry.changed_program()
+    """Return the function that answers as a change of a program, or two at once."""
+    if isinstance(change, Pair) or change.codes:
+        wrong = change.changed_program()
         return partial(_faulty_answer, wrong, _runner(wrong, report, compared), passes)
-    mutant = program.mutant_of(entry.kind, entry.function, entry.right, entry.wrong, entry.text)
+    mutant = program.mutant_of(
+        change.kind, change.function, change.right, change.wrong, change.text
+    )
     run = _runner(program, report, compared)
     return partial(_changed_answer, program, mutant, passes, run)
 

@@ -4,8 +4,9 @@ import numpy as np
 
 PLUMBOB = {
     "system": {"external_forces": True},
-    "step": {"method": "newton", "damper": "explicit", "pins": "eliminated"},
+    "step": {"method": "newton", "start": "x_n", "damper": "explicit"},
 }
+METHOD, START, ITERATIONS, DAMPER = "newton", "x_n", 60, "explicit"
 
 
 def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
@@ -13,16 +14,19 @@ def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
     count, inertia = len(masses), masses
     free = np.setdiff1d(np.arange(count), pinned)
     rows = (3 * free[:, None] + np.arange(3)).ravel()
-    weights = masses[:, None] * gravity
-    forces = weights + external_forces
+    forces = masses[:, None] * gravity
+    forces = forces + external_forces
+    first_lengths = np.zeros(len(springs))
     for s in range(len(springs)):
         i, j = springs[s]
         d = positions[i] - positions[j]
         length = np.linalg.norm(d)
+        first_lengths[s] = length
         u = d / length if length > 0.0 else np.zeros(3)
         damper = dampings[s] * ((velocities[i] - velocities[j]) @ u) * u
-        forces[i] -= damper
-        forces[j] += damper
+        if DAMPER == "explicit":
+            forces[i] -= damper
+            forces[j] += damper
     y = positions + h * velocities
 
     def gradient_and_hessian(x):
@@ -36,12 +40,21 @@ def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
             d = x[i] - x[j]
             length = np.linalg.norm(d)
             u = d / length if length > 0.0 else np.zeros(3)
+            along = np.outer(u, u)
+            across = 1.0 - rest / length if length > 0.0 else 0.0
+            if METHOD != "linearised":
+                across = max(0.0, across)
             pull = h**2 * k * (length - rest) * u
+            block = h**2 * k * (along + across * (np.eye(3) - along))
+            if DAMPER == "length_rate":
+                pull = pull + h * dampings[s] * (length - first_lengths[s]) * u
+                block = block + h * dampings[s] * along
+            if DAMPER == "end_velocity":
+                moved = (x[i] - positions[i]) - (x[j] - positions[j])
+                pull = pull + h * dampings[s] * (moved @ u) * u
+                block = block + h * dampings[s] * along
             gradient[i] += pull
             gradient[j] -= pull
-            along = np.outer(u, u)
-            across = max(0.0, 1.0 - rest / length) * (np.eye(3) - along) if length > 0.0 else 0.0
-            block = h**2 * k * (along + across)
             hessian[i, :, i] += block
             hessian[j, :, j] += block
             hessian[i, :, j] -= block
@@ -49,7 +62,11 @@ def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
         return gradient.ravel()[rows], hessian.reshape(3 * count, 3 * count)[np.ix_(rows, rows)]
 
     x = positions.copy()
-    for _ in range(500):
+    if START != "x_n":
+        x[free] = y[free]
+    if START == "s_n":
+        x[free] += h**2 * forces[free] / masses[free, None]
+    for _ in range(1 if METHOD == "linearised" else ITERATIONS):
         gradient, hessian = gradient_and_hessian(x)
         move = np.zeros(3 * count)
         move[rows] = np.linalg.solve(hessian, -gradient)

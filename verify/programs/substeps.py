@@ -3,13 +3,14 @@
 import numpy as np
 
 PLUMBOB = {"step": {"method": "symplectic", "substeps": 5, "damper": "explicit"}}
+SUBSTEPS = 5
 
 
 def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
                      pinned, gravity, positions, velocities, h):
-    substep = h / 5
+    substep = h / SUBSTEPS
     x, v = positions, velocities
-    for _ in range(5):
+    for _ in range(SUBSTEPS):
         forces = masses[:, None] * gravity
         for s in range(len(springs)):
             i, j = springs[s]
