@@ -95,7 +95,7 @@ def test_nothing_is_named_in_right_steps(form):
     [
         "PB-ROBOT-004",
         "PB-ROBOT-016",
-        "PB-ROBOT-018",
+        "PB-ROBOT-017",
         "PB-ROBOT-053",
         "PB-ROBOT-060",
         "PB-ROBOT-082",
