@@ -20,9 +20,6 @@ T = TypeVar("T")
 # The processor time that the search for the cause of one task's answers may take [s]: wall time
 # would make the answer depend on what else the machine does.
 SECONDS = 20.0
-# The predictions of steps that a search may take: a step is one, and each of its iterations a
-# fifth of one.
-MAX_PREDICTIONS = 30_000.0
 INTERRUPTED = sentence("The search for the cause was interrupted.")
 
 
@@ -36,7 +33,6 @@ class CauseSearch:
     def __init__(self, is_interrupted: bool = False) -> None:
         self.is_interrupted = is_interrupted  # whether the user ended it, or one before
         self.end: Sentence | None = INTERRUPTED if is_interrupted else None  # why it ended early
-        self.predictions_left = MAX_PREDICTIONS
 
     @property
     def is_on(self) -> bool:
@@ -69,7 +65,7 @@ class CauseSearch:
         """Raise SearchLimit in the block after `SECONDS` of processor time, and after as many more.
 
         Without timers of processor time (on Windows, and outside the main thread) a search ends
-        by the number of its predictions alone.
+        by the number of changes that it tries alone.
         """
         is_main = threading.current_thread() is threading.main_thread()
         if not (is_main and hasattr(signal, "setitimer")):
@@ -99,8 +95,8 @@ class JudgedAnswers(NamedTuple):
     report: TaskReport
     greeting: Greeting  # by which they are judged
     search: CauseSearch
-    # faults of what the task builds upon; None if it is right, or they are not known
-    base: Sequence[Any] | None = None
+    # whether what the task builds upon, as what places joints, is right or wrong for no known reason
+    is_placed: bool = True
 
     @property
     def exchanges(self) -> Sequence[Exchange]:

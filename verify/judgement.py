@@ -95,7 +95,6 @@ class Diagnosis:
     behaviour: Sentence | None = None  # the inferred model, if it is not declared
     first_broken: Sentence | None = None  # the first law along the computation, if unexplained
     hints: tuple[Sentence, ...] = ()  # at mistakes that no variant has
-    variant_count: int = 0  # number of variants that were compared
     is_double: bool = False  # whether the answers have more digits than single precision leaves
     is_certain: bool = False  # whether no other cause is sought
     # by case, the answer of the same program without the fault, where many answers are right

@@ -16,7 +16,7 @@ from .disciplines import DISCIPLINES
 from .examination import Examiner
 from .greeting import Greeting
 from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
-from .kinematics import inverse_kinematics, robot_inverse_kinematics, robot_jacobian
+from .kinematics import inverse_kinematics
 from .kinematics.claims import OF_WRONG_POSES
 from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
@@ -192,7 +192,8 @@ class Attempt:
         causes = [report for report in reports if _builds_on(self.task, self._method, report)]
         order = BUILDS_ON.get(self.task, ())
         causes.sort(key=lambda r: (not r.diagnosis.explained, order.index(r.task)))
-        diagnose = partial(self._diagnosis, search, _known_faults(self.task, reports, causes))
+        is_placed = not (causes and causes[0].diagnosis.explained)
+        diagnose = partial(self._diagnosis, search, is_placed)
         report = search.run(lambda: _with_diagnosis(verdict, diagnose), verdict)
         if not causes and report.greeting is not None:
             find_line = partial(with_changed_line, report, report.greeting, self.contestant)
@@ -204,22 +205,11 @@ class Attempt:
                 report = _unless_meant(report, search.run(find_line, original))
         return _with_cause(report, causes)
 
-    def _diagnosis(
-        self,
-        search: CauseSearch,
-        base: Sequence[str] | None,
-        report: TaskReport,
-    ) -> Diagnosis:
-        """Return why answers are wrong, in the precision that they are judged by or in single."""
+    def _diagnosis(self, search: CauseSearch, is_placed: bool, report: TaskReport) -> Diagnosis:
+        """Return what answers show beside changed lines."""
         greeting = report.greeting or self.contestant.greeting
-        find = DISCIPLINES[self.task].diagnose
-        diagnosis = find(JudgedAnswers(report, greeting, search, base))
-        is_wrong = report.verdict is Verdict.WRONG and not diagnosis.explained
-        if is_wrong and greeting.precision == "double" and precision.has_double(report):
-            single = msgspec.structs.replace(greeting, precision="single")
-            inexact = find(JudgedAnswers(report, single, search, base))
-            diagnosis = inexact if inexact.explained else diagnosis
-        return diagnosis
+        answers = JudgedAnswers(report, greeting, search, is_placed)
+        return DISCIPLINES[self.task].diagnose(answers)
 
     def _with_unsent(self, report: TaskReport) -> TaskReport:
         unsent, hints = self._unsent, report.diagnosis.hints
@@ -235,19 +225,11 @@ def _with_hint(report: TaskReport, hint: Sentence) -> TaskReport:
 
 
 def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnosis]) -> TaskReport:
-    """Return a report with its diagnosis, after the explanations of examiners.
-
-    A solver that is judged by restricted requests may have a mistake in the other requests.
-    """
+    """Return a report with its diagnosis, after the explanations of examiners."""
     before = report.diagnosis
     if before.is_certain:
         return report
     diagnosis = diagnose(report)
-    if report.original is not None and not diagnosis.explained:
-        explanations = diagnose(report.original).explanations
-        if report.verdict <= Verdict.UNDECIDED:
-            explanations = tuple(map(_if_unmeant, filter(_is_of_inputs, explanations)))
-        diagnosis = replace(diagnosis, explanations=explanations)
     explanations = (*before.explanations, *diagnosis.explanations)
     diagnosis = replace(diagnosis, explanations=explanations)
     judgements = [
@@ -281,26 +263,6 @@ def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> Ta
     if not observed:
         return report
     return replace(report, diagnosis=replace(report.diagnosis, observations=observed))
-
-
-def _known_faults(
-    task: str, reports: Sequence[TaskReport], causes: Sequence[TaskReport]
-) -> Sequence[str] | None:
-    """Return the keys of the faults of a task's foundations, none if unexplained, None if right.
-
-    Poses of robots that miss for a known reason miss in motions too.
-    """
-    wrong = list(causes)
-    if task.startswith("robot"):
-        poses = robot_inverse_kinematics.TASK
-        wrong = [cause for cause in causes if cause.task == poses]
-        wrong += [
-            r for r in reports if r.task == robot_jacobian.TASK and r.verdict >= Verdict.WRONG
-        ]
-    explanations = [
-        explanation for report in wrong for explanation in report.diagnosis.explanations[:1]
-    ]
-    return [key for explanation in explanations for key in explanation.faults] if wrong else None
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:

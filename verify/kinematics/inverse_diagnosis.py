@@ -26,7 +26,7 @@ def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
         for trial in trials
         if trial.pose.finite
     ]
-    diagnosis = claims.with_claims(diagnosis, judgements, answers, not judged_answers.base)
+    diagnosis = claims.with_claims(diagnosis, judgements, answers, judged_answers.is_placed)
     if is_sound(judgements):  # what is wrong without limits is so with them
         _, key = limits.judge(limited, greeting, True)
         reading = [Explanation((key,), sentences_of("limits")[key], 1.0, 0.0)] if key else []

@@ -16,5 +16,7 @@ def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
         for case, frames in motions
         if frames
     ]
-    diagnosis = claims.with_claims(Diagnosis(), report.judgements, answers, not judged_answers.base)
+    diagnosis = claims.with_claims(
+        Diagnosis(), report.judgements, answers, judged_answers.is_placed
+    )
     return with_hints(report.judgements, diagnosis)

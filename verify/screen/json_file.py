@@ -55,7 +55,7 @@ def _task(task: TaskReport, say: Say) -> Record:
         ],
         "behaviour": behaviour and say(behaviour),
         "first_broken": first_broken and say(first_broken),
-        "hints": list(map(say, diagnosis.hints)), "tried": diagnosis.variant_count,
+        "hints": list(map(say, diagnosis.hints)),
         "smallest_failure": task.smallest_failure.case.name if task.smallest_failure else None,
         "cases": [_case(judgement, say) for judgement in task.judgements],
     }  # fmt: skip
