@@ -95,7 +95,7 @@ class JudgedAnswers(NamedTuple):
     report: TaskReport
     greeting: Greeting  # by which they are judged
     search: CauseSearch
-    # whether what the task builds upon, as what places joints, is right or wrong for no known reason
+    # whether what places joints is right, or wrong for no known reason
     is_placed: bool = True
 
     @property

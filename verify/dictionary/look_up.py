@@ -17,10 +17,11 @@ from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
 from .constant_sweeps import known_fault, makes_constant_sweeps
 from .entry import Dictionary, Entry, file_of, likelihood, read
-from .requests import IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
+from .requests import FK, IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
 
-# Keys differ by ten times the rounding of an answer: single precision loses three digits more.
-TOLERANCES = {"double": 1e-6, "single": 1e-4}
+# Keys differ by ten times the rounding of an answer: single precision loses three digits more, and
+# a fourth where a mistake enlarges rounding, which is tried where nothing is nearer.
+TOLERANCES = {"double": (1e-6,), "single": (1e-4, 1e-3)}
 # Equal requests get answers that differ by less, but for threads that add up in another order.
 SAME = 1e-6
 # The most candidates, which all cases have to decide between.
@@ -36,6 +37,7 @@ class Proposals(NamedTuple):
     entries: Sequence[Entry] = ()  # the likeliest first
     sweeps: int | None = None  # that are made whatever is asked
     is_wrong: bool = True  # whether the solver answers a request otherwise than right programs
+    of_positions: bool = False  # whether positions alone are alike: rotations of no matrix are any
     hint: Sentence | None = None  # why nothing is looked up, or that no file can be read
 
 
@@ -58,25 +60,49 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
         return Proposals(hint=UNSTEADY)
-    tolerance = TOLERANCES[greeting.precision]
+    tolerance, *_ = TOLERANCES[greeting.precision]
     if task == IK and makes_constant_sweeps(cases, first):
         assert isinstance(first[0], Answer)
         base = Program(source_of(IN_DICTIONARY[methods[0]][0]))
         known = known_fault(base, dictionaries.values(), methods[0], cases[0], first[0], tolerance)
         if known[1] != 1:  # which solves show better
             return Proposals(*known)
-    ranks, is_wrong = list[tuple[int, Entry]](), False
-    for own in methods:
-        base = Program(source_of(IN_DICTIONARY[own or task][0]))
-        names = [case.name for case in requests(task, method)]
-        is_solved = [is_solve(case) for case in requests(task, method)]
-        rows = np.full((len(names), len(OUTPUTS[task])), np.nan)
-        for case, answer in zip(cases, first, strict=True):
-            rows[names.index(case.name)] = _keys_of(answer, case, base, own)
-        is_wrong |= bool(np.nanmax(np.abs(rows), initial=0.0) > tolerance)
-        ranks += _matches(dictionaries[own], rows, is_solved, tolerance)
+    tables = [_table(dictionaries[own], task, own, cases, first) for own in methods]
+    is_wrong = any(np.nanmax(np.abs(rows), initial=0.0) > tolerance for _, rows, _ in tables)
+    for bound in TOLERANCES[greeting.precision]:
+        if entries := _candidates(tables, bound):
+            return Proposals(entries, is_wrong=is_wrong)
+    if task == FK:
+        positions = [(dictionary, rows[:, :1], solves) for dictionary, rows, solves in tables]
+        return Proposals(_candidates(positions, tolerance), is_wrong=is_wrong, of_positions=True)
+    return Proposals(is_wrong=is_wrong)
+
+
+# A dictionary, the keys of a solver's answers (request, output), and which requests are solves.
+Table = tuple[Dictionary, FloatArray, list[bool]]
+
+
+def _table(
+    dictionary: Dictionary,
+    task: str,
+    method: str,
+    cases: Sequence[Case],
+    answers: Sequence[Answer | Failure],
+) -> Table:
+    """Return the keys of a solver's answers, NaN of requests that are not sent."""
+    base, all_cases = Program(source_of(IN_DICTIONARY[method or task][0])), requests(task, method)
+    names = [case.name for case in all_cases]
+    rows = np.full((len(names), len(OUTPUTS[task])), np.nan)
+    for case, answer in zip(cases, answers, strict=True):
+        rows[names.index(case.name)] = _keys_of(answer, case, base, method)
+    return dictionary, rows, list(map(is_solve, all_cases))
+
+
+def _candidates(tables: Sequence[Table], tolerance: float) -> list[Entry]:
+    """Return the likeliest of the entries that match rows of keys."""
+    ranks = [pair for table in tables for pair in _matches(*table, tolerance)]
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
-    return Proposals([entry for _, entry in ranks[:MAX_CANDIDATES]], is_wrong=is_wrong)
+    return [entry for _, entry in ranks[:MAX_CANDIDATES]]
 
 
 def _unreadable(file: str) -> Sentence:
@@ -108,14 +134,16 @@ def _matches(
 ) -> list[tuple[int, Entry]]:
     """Return the entries with the keys of all answered requests, or (1) of a single wrong one.
 
-    An entry with wrong single sweeps has no keys of solves.
+    The rows have the keys of all outputs or of the first ones. An entry with wrong single sweeps
+    has no keys of solves.
     """
+    keys = dictionary.keys[:, :, : rows.shape[1]]
     answered = np.isfinite(rows)
     with np.errstate(invalid="ignore"):
-        gaps = np.abs(dictionary.keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
+        gaps = np.abs(keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
         is_wrong = np.any(np.abs(rows) > tolerance, axis=1)
     is_alike = np.all(gaps | ~answered, axis=2)
-    is_unknown = np.all(np.isnan(dictionary.keys), axis=2) & is_solve
+    is_unknown = np.all(np.isnan(keys), axis=2) & is_solve
     every, single = np.all(is_alike | is_unknown, axis=1), np.any(is_alike & is_wrong, axis=1)
     numbers = np.flatnonzero((every | single) & is_wrong.any())
     return [(int(not every[i]), dictionary.entries[i]) for i in numbers]

@@ -75,6 +75,10 @@ ITERATIONS = "max_iterations"
 LINE, AROUND = 60, 20
 # Relative differences that rounding and the ends of iterations explain, by precision.
 TOLERANCE = {"double": 1e-7, "single": 2e-4}
+# In single precision a change may enlarge rounding, up to so many times the tolerance: inputs in it
+# move its answers by a part, and its own steps by so many times as much.
+ROUNDINGS, MOST_ENLARGED = 30.0, 50.0
+NO_ANSWER = (ValueError, IndexError, ArithmeticError, np.linalg.LinAlgError)
 
 
 def with_changed_line(
@@ -209,6 +213,8 @@ def changed_lines(
         is_known |= not proposals.is_wrong and report.task in RARE_ELSEWHERE
         if proposals.sweeps is not None:
             compared = _with_sweeps(compared, proposals.sweeps)
+        if proposals.of_positions:
+            compared = list(map(_of_positions, compared))
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -447,7 +453,8 @@ def _of_changes(
                 entry = parts[0] if len(parts) == 1 else Pair(*parts)
                 with suppress(SyntaxError, ValueError):
                     predict = _answer_of_change(entry, program, report, compared, passes)
-                    yield Variant(faults, predict, is_special=not parts[0].codes)
+                    enlarged = _enlargement(predict, different[0].case, tolerance)
+                    yield Variant(faults, predict, not parts[0].codes, enlarged)
 
     def describe(keys: Sequence[str]) -> Sentence:
         parts = changes[keys[0]]
@@ -482,6 +489,25 @@ def _sentences_of(entry: Entry) -> list[Sentence]:
     return [_describe({"": entry}, [""], entry.equal_count)]
 
 
+def _enlargement(
+    predict: Callable[[Case], Mapping[str, Any]], case: Case, tolerance: float
+) -> float:
+    """Return by how much more than the tolerance allows a change enlarges single precision."""
+    if tolerance < TOLERANCE["single"]:
+        return 1.0
+    inputs = {name: _rounded(value) for name, value in case.inputs.items()}
+    with suppress(*NO_ANSWER):
+        moved = difference(predict(replace(case, inputs=inputs)), predict(case))
+        return min(max(1.0, ROUNDINGS * moved / tolerance), MOST_ENLARGED)
+    return 1.0
+
+
+def _rounded(value: Any) -> Any:
+    """Return numbers in single precision, others as they are."""
+    is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
+    return value.astype(np.float32).astype(float) if is_real else value
+
+
 def _answer_of_change(
     change: Entry | Pair,
     program: Program,
@@ -498,6 +524,12 @@ def _answer_of_change(
     )
     run = _runner(program, report, compared)
     return partial(_changed_answer, program, mutant, passes, run)
+
+
+def _of_positions(exchange: Exchange) -> Exchange:
+    """Return an answer with its positions alone."""
+    assert isinstance(exchange.answer, Answer)
+    return replace(exchange, answer=Answer({"positions": exchange.answer.values["positions"]}, 0.0))
 
 
 def _with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
