@@ -53,7 +53,7 @@ class Entry(NamedTuple):
         return {k: t for k, t in self.changed_program().texts.items() if right.get(k) != t}
 
 
-class Pair(NamedTuple):
+class ChangePair(NamedTuple):
     """Two changes of a right program at once."""
 
     first: Entry

@@ -221,8 +221,10 @@ def _words(integrator: Integrator, tracks: Sequence[Track | None]) -> tuple[str,
         test = sentence("after {low} to {high} iterations", low=min(ends), high=max(ends))
     is_single = integrator.method == "local_global" and set(ends) == {1}
     code = KEPT_DIRECTIONS if is_single else EARLY_END
-    values = {"fault": with_code(code, coded_faults()[code].sentence), "test": test}
-    values |= {"name": NAMES[integrator.method], "count": len(ends), "total": len(tracks)}
+    values = {
+        "fault": with_code(code, coded_faults()[code].sentence),
+        "name": NAMES[integrator.method], "test": test, "count": len(ends), "total": len(tracks),
+    }  # fmt: skip
     if is_single:
         return code, sentence("{fault} This is so in {count} of {total} answers.", **values)
     return code, sentence(
@@ -316,10 +318,11 @@ def _conjugate_gradients(
     A: FloatArray, b: FloatArray, x: FloatArray, scale: FloatArray
 ) -> Iterator[FloatArray]:
     """Yield the iterates of conjugate gradients that a matrix preconditions."""
-    residual, direction, before = b - A @ x, 0.0 * b, 1.0
+    residual: FloatArray = b - A @ x
+    direction, before = 0.0 * b, 1.0
     while True:
         yield x
-        z = np.linalg.solve(scale, residual)
+        z: FloatArray = np.asarray(np.linalg.solve(scale, residual), dtype=float)
         after = float(residual @ z)
         direction = z + after / before * direction if direction.any() else z
         image = A @ direction

@@ -14,7 +14,7 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 
 from ..case import Case
 from ..contestant import Answer, Contestant, Exchange, Failure
-from ..dictionary.entry import Entry, Pair
+from ..dictionary.entry import ChangePair, Entry
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..dictionary.requests import TASKS
 from ..explain import MORE, Variant, explain, together
@@ -55,7 +55,7 @@ MAX_IN_PAIRS = 12
 # changes are looked up, few are left that only a search finds.
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
 # Of a right step, which takes longer.
-MAX_MUTANTS_OF_STEPS = 3_000
+MAX_MUTANTS_OF_STEPS = 2_000
 # Programs of these answer in conventions of their own: what they share is changed in each.
 OF_STEPS = ("mass_spring_step", "mass_spring_motion")
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics", *OF_STEPS)
@@ -422,15 +422,15 @@ def _of_entries(
     return best if best and best[0].share >= MIN_SHARE else ()
 
 
-def _pairs(entries: Sequence[Entry]) -> list[Pair]:
+def _pairs(entries: Sequence[Entry]) -> list[ChangePair]:
     """Return two changes at once, of the likeliest changes that requests propose."""
     single = [entry for entry in entries if len(entry.codes) < 2]
-    return [Pair(*pair) for pair in combinations(single[:MAX_IN_PAIRS], 2)]
+    return [ChangePair(*pair) for pair in combinations(single[:MAX_IN_PAIRS], 2)]
 
 
 def _of_changes(
     program: Program,
-    entries: Sequence[Entry | Pair],
+    entries: Sequence[Entry | ChangePair],
     report: TaskReport,
     compared: Sequence[Exchange],
     tolerance: float,
@@ -450,7 +450,7 @@ def _of_changes(
                     name for place, part in enumerate(parts) for name in _names(part, number, place)
                 )
                 changes[" + ".join(faults)] = parts
-                entry = parts[0] if len(parts) == 1 else Pair(*parts)
+                entry = parts[0] if len(parts) == 1 else ChangePair(*parts)
                 with suppress(SyntaxError, ValueError):
                     predict = _answer_of_change(entry, program, report, compared, passes)
                     enlarged = _enlargement(predict, different[0].case, tolerance)
@@ -467,8 +467,8 @@ def _of_changes(
                    _trial(report))[0]  # fmt: skip
 
 
-def _parts(change: Entry | Pair) -> tuple[Entry, ...]:
-    return (change.first, change.second) if isinstance(change, Pair) else (change,)
+def _parts(change: Entry | ChangePair) -> tuple[Entry, ...]:
+    return (change.first, change.second) if isinstance(change, ChangePair) else (change,)
 
 
 def _count(parts: Sequence[Entry]) -> int:
@@ -509,14 +509,14 @@ def _rounded(value: Any) -> Any:
 
 
 def _answer_of_change(
-    change: Entry | Pair,
+    change: Entry | ChangePair,
     program: Program,
     report: TaskReport,
     compared: Sequence[Exchange],
     passes: Mapping[str, int],
 ) -> Callable[[Case], Mapping[str, Any]]:
     """Return the function that answers as a change of a program, or two at once."""
-    if isinstance(change, Pair) or change.codes:
+    if isinstance(change, ChangePair) or change.codes:
         wrong = change.changed_program()
         return partial(_faulty_answer, wrong, _runner(wrong, report, compared), passes)
     mutant = program.mutant_of(
