@@ -201,7 +201,9 @@ class Attempt:
             original = report.original
             if original is not None and not report.diagnosis.explained:
                 greeting = self.contestant.greeting
-                find_line = partial(with_changed_line, original, greeting, known_alone=True)
+                find_line = partial(
+                    with_changed_line, original, greeting, self.contestant, known_alone=True
+                )
                 report = _unless_meant(report, search.run(find_line, original))
         return _with_cause(report, causes)
 

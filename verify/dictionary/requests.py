@@ -28,10 +28,12 @@ ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
 TREE = ([-1, 0, 1, 1, 3, 4], 4, (1.4, -1.0, -1.4))
 CHAIN = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6))
 IN_PLANE = ([-1, 0, 1, 2], 3, (-0.6, -0.2, 0.0))
+# For solvers of positions alone: without rotations, in a plane as well.
+AT_REST = ([-1, 0, 1, 2], 3, (-0.5, -0.4, 0.0))
 # With tolerance and number of sweeps: single sweeps, then solves that end by either of them. CCD
 # needs 12 sweeps to the tolerance, FABRIK 10: most round distances end them elsewhere.
 PROBLEMS = (
-    (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*TREE, 0.0, 3),
+    (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*AT_REST, 0.0, 1), (*TREE, 0.0, 3),
     (*CHAIN[:2], (-1.1, -0.6, 0.3), 4e-3, 16),
 )  # fmt: skip
 # A triangle with a tail; every spring has numbers of its own.
@@ -69,6 +71,8 @@ def requests(task: str, method: str) -> list[Case]:
         rotations = fractions(4 * joints, start + 3).reshape(joints, 4)
         if target[2] == 0.0:
             offsets, rotations = offsets * [1, 1, 0], rotations * [1, 0, 0, 1]
+        if problem[:3] == AT_REST:
+            rotations = np.eye(4)[[0] * joints]
         inputs: dict[str, Any] = {
             "parents": np.array(parents),
             "offsets": offsets,
@@ -116,7 +120,9 @@ def suitable(case: Case, greeting: Greeting) -> bool:
         is_damped = case.task == ENERGY or greeting.step.damper not in UNDAMPED
         return takes_all and is_damped and greeting.fixed.gravity is None and not greeting.planar
     is_planar = not case.inputs["offsets"][:, 2].any()
-    is_free = greeting.rotations and greeting.planar is is_planar and not greeting.limits
+    is_at_rest = bool((case.inputs["local_rotations"][:, 0] == 1.0).all())
+    is_free = greeting.rotations is not is_at_rest and not greeting.limits
+    is_free &= greeting.planar is is_planar or is_at_rest
     is_ended = greeting.fixed.tolerance is None or not case.inputs.get("tolerance")
     return (
         is_free

@@ -217,6 +217,9 @@ def changed_lines(
             compared = list(map(_of_positions, compared))
         entries = [entry for entry in proposals.entries if entry.codes or not is_known]
         best = _of_entries(entries, report, compared, tolerance)
+        looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
+        others = [program for program in programs if program.source not in looked_up]
+        best = best or _of_programs(others, report, compared, tolerance, is_known=True)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
         first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
         programs = [p for p in programs if p.source in first and not proposals.is_wrong]
