@@ -9,7 +9,7 @@ from plumbob.verify.fault_programs import contestant_of, source_of
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from plumbob.verify.kinematics import problems
-from plumbob.verify.one_line import search
+from plumbob.verify.one_line import answers, search
 from plumbob.verify.one_line.right_programs import programs_of
 from plumbob.verify.verify import verify
 
@@ -81,7 +81,7 @@ def explained(report):
 @pytest.mark.parametrize("name", HONEST)
 def test_a_right_program_gives_honest_steps_of_other_constants(name):
     report = report_of(HONEST[name], 6)
-    compared = search._compared(report, [])
+    compared = answers.compared_answers(report, [])
     programs = [p for p in programs_of(TASK, METHOD, Step()) if "within" not in p.names]
     assert any(search._gives(program, report, compared, 1e-7) for program in programs)
 

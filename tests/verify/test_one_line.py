@@ -21,8 +21,8 @@ from plumbob.verify.fault_programs import (
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.judgement import Explanation, Verdict
 from plumbob.verify.kinematics.limits import solve_within
-from plumbob.verify.one_line import right_programs, search
-from plumbob.verify.one_line.mutants import Program
+from plumbob.verify.one_line import answers, right_programs, search, sentences
+from plumbob.verify.one_line.mutants import Mutant, Program
 from plumbob.verify.screen import terminal
 from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import DISCIPLINES, judge_cases, trials, verify
@@ -237,7 +237,7 @@ def test_answers_of_a_right_program_speak_for_no_change():
     broken = replace(judgement.findings[0], verdict=Verdict.WRONG)
     judgements = [replace(each, findings=(broken,)) for each in report.judgements]
     report = replace(report, judgements=judgements)
-    assert search._compared(report, [])
+    assert answers.compared_answers(report, [])
     assert search.changed_lines(report, greeting) == ()
 
 
@@ -288,7 +288,7 @@ def test_the_program_is_as_it_was_after_all_changes():
     program.observe(partial(program.names["count"], 4))
     first = [(mutant.kind, mutant.wrong) for mutant in program.mutants(set())]
     assert first == [(mutant.kind, mutant.wrong) for mutant in program.mutants(set())]
-    assert {kind for kind, _ in first} <= set(search.FAULTS)
+    assert {kind for kind, _ in first} <= set(right_programs.FAULTS)
 
 
 def test_lines_with_braces_are_moved_out_of_a_loop():
@@ -300,12 +300,12 @@ def test_lines_with_braces_are_moved_out_of_a_loop():
 
 def test_long_lines_are_cut_to_what_differs():
     line = "result = " + " + ".join(f"term_{i}" for i in range(30))
-    right, wrong = search.excerpts(line, line.replace("term_15", "term_51"))
+    right, wrong = sentences.excerpts(line, line.replace("term_15", "term_51"))
     assert "term_15" in right
     assert "term_51" in wrong
     assert len(right) < 75
     assert (right[0], right[-1]) == ("…", "…")
-    assert search.excerpts("a = b", "a = c") == ("a = b", "a = c")
+    assert sentences.excerpts("a = b", "a = c") == ("a = b", "a = c")
 
 
 @pytest.mark.slow
@@ -354,8 +354,8 @@ def test_lines_of_kinematics_are_named(program, method, right, wrong, code):
 
 
 def test_a_missing_placement_is_told_for_programs_that_keep_positions():
-    mutants = {"": search.Mutant("missing line", "ccd", "x, R = kinematics(p, o, q)", "", None)}
-    assert "mark all of them as out of date" in str(search._describe(mutants, [""]))
+    changes = {"": Mutant("missing line", "ccd", "x, R = kinematics(p, o, q)", "", None)}
+    assert "mark all of them as out of date" in str(sentences.changes_in_words(changes, [""]))
 
 
 def test_no_module_stands_for_a_value():
