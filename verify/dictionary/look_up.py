@@ -56,6 +56,8 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
             dictionaries[own] = read(file_of(task, own))
         except (OSError, ValueError):
             return Proposals(hint=_unreadable(file_of(task, own).name))
+        if dictionaries[own].keys.shape[1] != len(requests(task, own)):  # of another version
+            return Proposals(hint=_unreadable(file_of(task, own).name))
     contestant.close()
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
