@@ -53,10 +53,8 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
     dictionaries = dict[str, Dictionary]()
     for own in methods:
         try:
-            dictionaries[own] = read(file_of(task, own))
+            dictionaries[own] = _dictionary(task, own)
         except (OSError, ValueError):
-            return Proposals(hint=_unreadable(file_of(task, own).name))
-        if dictionaries[own].keys.shape[1] != len(requests(task, own)):  # of another version
             return Proposals(hint=_unreadable(file_of(task, own).name))
     contestant.close()
     first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
@@ -78,6 +76,14 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
         positions = [(dictionary, rows[:, :1], solves) for dictionary, rows, solves in tables]
         return Proposals(_candidates(positions, tolerance), is_wrong=is_wrong, of_positions=True)
     return Proposals(is_wrong=is_wrong)
+
+
+def _dictionary(task: str, method: str) -> Dictionary:
+    """Return the dictionary of a task and a method; raise ValueError if it is of other requests."""
+    dictionary, count = read(file_of(task, method)), len(requests(task, method))
+    if dictionary.keys.shape[1] != count:
+        raise ValueError(f"expected keys of {count} requests, got {dictionary.keys.shape[1]}")
+    return dictionary
 
 
 # A dictionary, the keys of a solver's answers (request, output), and which requests are solves.

@@ -188,7 +188,7 @@ def reached(
     """Return whether the effector is as near as possible, within the tolerance."""
     nearest, inputs = case.facts["least"], case.inputs
     tolerance, excess = inputs["tolerance"] + slack, distance - nearest
-    if method and nearest > 0.0:
+    if method and (nearest > 0.0 or greeting.fixed.max_iterations is not None):
         _, x, _ = solve(method, inputs)
         closest = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
         tolerance += AS_SLOW * max(0.0, closest - nearest)

@@ -231,6 +231,8 @@ class SolvedPose:
         root = (self.answer.positions if x is None else x)[0]
         gap = np.abs(root - self.offsets[0]).max() / self.size
         self.tables["root_position"].add(self.name, gap, self._whole())
+        gaps = (np.abs(point).max() / self.size for point in (root, self.offsets[0]))
+        self.equalities.add("root_at_origin", self.name, *gaps)
         if x is not None:
             self._add_links(x)
         if self.local is not None:
