@@ -223,7 +223,7 @@ def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_changed_line_has_to_give_three_quarters_of_the_answers(share, is_named, monkeypatch):
     explanation = Explanation(("a line",), sentence("It is wrong."), share, 0.0)
-    monkeypatch.setattr(search, "_of_program", lambda *arguments: (explanation,))
+    monkeypatch.setattr(search, "of_program", lambda *arguments: (explanation,))
     source = source_of("energy in loops")
     wrong = source.replace("length - rest_lengths[s]", "length - stiffnesses[s]")
     assert changed_lines(wrong, "energy") == ((explanation,) if is_named else ())
@@ -239,6 +239,19 @@ def test_answers_of_a_right_program_speak_for_no_change():
     report = replace(report, judgements=judgements)
     assert answers.compared_answers(report, [])
     assert search.changed_lines(report, greeting) == ()
+
+
+@pytest.mark.parametrize(("gap", "is_near"), [(1e-7, True), (1e-5, False)])
+def test_wrong_answers_next_to_right_ones_tell_no_cause(gap, is_near):
+    report, _ = report_on(source_of("energy in loops"), "energy")
+    (judgement, *_) = report.judgements
+    moved = {name: value * (1.0 + gap) for name, value in judgement.answer.values.items()}
+    answer = replace(judgement.answer, values=moved)
+    broken = replace(judgement.findings[0], verdict=Verdict.WRONG)
+    wrong = replace(judgement, answer=answer, findings=(broken,), expected=judgement.answer.values)
+    report = replace(report, judgements=[wrong])
+    exchange = Exchange(judgement.case, answer, answer)
+    assert answers.without_near([exchange], report, 1e-7) == ([] if is_near else [exchange])
 
 
 @pytest.mark.slow

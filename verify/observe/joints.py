@@ -137,6 +137,8 @@ def _add_products(pose: ForwardPose, raw: FloatArray, equalities: Equalities) ->
         "own_first": rotation.multiply(pose.local, pose.above),
         "parent_alone": pose.above,
         "own_alone": pose.local,
+        "parent_local": rotation.multiply(pose.local[pose.parents], pose.local),
+        "parent_local_last": rotation.multiply(pose.local, pose.local[pose.parents]),
     }
     below = pose.parents >= 0
     for key, value in rules.items():

@@ -29,6 +29,9 @@ MIN_DIFFERENT = 3
 MAX_PASSES, OF_CURVES = 200, 2000
 # But not if they go as often through them for the shortest case, as a constant number of sweeps.
 LONGER = 3
+# A cause would be any that is as near, where a wrong answer is as near to the right one as so many
+# tolerances.
+NEAR = 3.0
 # The law of sweeps that are neither the textbook's nor those of a known honest program.
 ANOTHER = "one sweep, another"
 # The input that asks for a single iteration of a solver.
@@ -119,6 +122,20 @@ def with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
         for e in compared
         if e.case.inputs["tolerance"] == 0.0
     ]
+
+
+def without_near(
+    compared: Sequence[Exchange], report: TaskReport, tolerance: float
+) -> list[Exchange]:
+    """Return answers without the wrong ones that are too near to right ones to tell a cause."""
+    near = {
+        j.case.name
+        for j in report.judgements
+        if j.verdict >= Verdict.UNDECIDED
+        and isinstance(j.answer, Answer)
+        and difference(j.expected, j.answer.values) <= NEAR * tolerance
+    }
+    return [exchange for exchange in compared if exchange.case.name not in near]
 
 
 def positions_alone(exchange: Exchange) -> Exchange:

@@ -18,7 +18,7 @@ from ..kinematics.early_ends import EARLY_ENDS
 from ..kinematics.limits import READINGS
 from ..precision import judging_greeting
 from . import tool_steps
-from .answers import compared_answers, doubtful_answers, positions_alone, with_sweeps
+from .answers import compared_answers, doubtful_answers, positions_alone, with_sweeps, without_near
 from .candidates import MIN_SHARE, OF_STEPS, TOLERANCE, of_entries, of_numbers, of_program, run_of
 from .fitted import is_fitted
 from .mutants import Program
@@ -123,6 +123,7 @@ def changed_lines(
         return ()
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
+    compared = without_near(compared, report, tolerance)
     if report.task == tool_steps.MOTIONS:
         compared = compared[: tool_steps.MAX_MOTIONS]
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
