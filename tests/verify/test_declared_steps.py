@@ -247,11 +247,11 @@ def test_an_undeclared_method_has_a_reservation_and_is_named_by_what_it_is():
     assert '"method": "local_global", "start": "y", "iterations": 1' in behaviour
 
 
-def test_iterations_that_end_early_are_still_named():
+def test_few_iterations_in_place_of_a_converged_step_are_told():
     report = judged(Stepper(model("local_global", "y", 4)), Step("converged", damper="none"))
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
-    assert explanation.codes == ("PB-STEP-168",)
+    assert "behaves like this: 4 local/global iterations from y" in str(explanation.sentence)
 
 
 @pytest.mark.parametrize(("explained", "share"), [(0, None), (1, None), (2, 0.5), (4, 1.0)])
