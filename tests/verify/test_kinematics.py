@@ -28,7 +28,7 @@ from kinematics_solvers import (
 from plumbob.reference import IK_SOLVERS, resample, rotation
 from plumbob.text.sentence import codes_in
 from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.greeting import Greeting
+from plumbob.verify.greeting import Fixed, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import honest, problems, sweeps
 from plumbob.verify.kinematics.polylines import Polyline
@@ -85,6 +85,22 @@ def test_right_points_beside_unknown_rotations_are_told(is_told):
         trials.append(sweeps.PoseTrial(Exchange(case, answer, answer)))
     comparison = sweeps.SweepComparison("fabrik", wrong=[trials[0].case.name])
     assert (sweeps.right_points(comparison, trials, greeting) is not None) == is_told
+
+
+@pytest.mark.parametrize(("made", "is_told"), [(1, True), (10, False)])
+@pytest.mark.usefixtures("without_changed_lines")
+def test_another_number_of_sweeps_than_the_declared_one_is_told(made, is_told):
+    solver = textbook(INVERSE, "fabrik")
+    fixed = Fixed(max_iterations=10, tolerance=0.0)
+    report = judged(
+        INVERSE,
+        lambda **inputs: solver(**{**inputs, "max_iterations": made}),
+        "fabrik",
+        fixed=fixed,
+    )
+    words = "Each answer is that after sweep 1 of FABRIK"
+    assert any(words in str(hint) for hint in report.diagnosis.hints) is is_told
+    assert (report.verdict >= WRONG) is is_told
 
 
 # ---- honest solvers

@@ -64,6 +64,7 @@ def _with_hints(
     first_sweeps = [trial for trial in sweep_trials if trial.case.facts["sweeps"] == 1]
     hints = (
         sweeps.idle(trials) or sweeps.idle(first_sweeps),
+        sweeps.other_count(comparison, sweep_trials, greeting),
         sweeps.right_points(comparison, sweep_trials, greeting),
         sweeps.lengths(trials),
     )

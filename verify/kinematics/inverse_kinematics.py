@@ -46,6 +46,11 @@ WORLDS = {
 # A solver of its own method that misses no larger share of the targets is slow there, not wrong:
 # CCD from the root is after 60 sweeps from a straight arm two thirds as far as at the start.
 FEW_MISSES = 0.1
+WORLDS_IN_WORDS = {
+    "shifted": sentence("in a shifted world"),
+    "rotated": sentence("in a rotated world"),
+    "in other units": sentence("with all lengths in another unit"),
+}
 # Beyond reach the textbook's solvers need many sweeps: an honest solver may be so many times as far
 # from the nearest point as they are.
 AS_SLOW = 1.5
@@ -260,9 +265,10 @@ def _equal_worlds(
     size, amplification = trial.case.facts["size"], trial.case.facts["amplification"]
     tolerance = 2.0 * rounding.sweep(greeting.epsilon, len(x), size, amplification)
     error, verdict = trial.pose.distance_to(x), Verdict.WRONG
+    how = WORLDS_IN_WORDS[trial.case.facts["how"]]
     if not comparison.method or comparison.honest:
         is_small = error <= rounding.STALL[greeting.precision] * trial.case.facts["reach"]
         verdict = Verdict.RIGHT_EXCEPT if is_small else WORLDS[trial.case.facts["how"]]
         if greeting.fixed.max_iterations is not None:
-            return finding("equal worlds, constant", error, tolerance)
-    return finding("equal worlds", error, tolerance, verdict=verdict)
+            return finding("equal worlds, constant", error, tolerance, how=how)
+    return finding("equal worlds", error, tolerance, verdict=verdict, how=how)

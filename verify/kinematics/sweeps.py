@@ -32,6 +32,8 @@ SMALLEST = 1e-3
 LAW = "one sweep"
 # Products of unit quaternions, not normalised, stay nearer to the length 1.
 DRIFTED = 1e-2
+# The most sweeps that answers may have in the place of those that are asked for.
+MOST_SWEEPS = 30
 # Quaternions whose numbers differ by less are alike, in single precision too.
 ROUNDED = 1e-6
 
@@ -280,6 +282,31 @@ def _explains(
         <= prediction_bound(greeting, trial.case)
         for trial in trials
     )
+
+
+def other_count(
+    comparison: SweepComparison, trials: Sequence[PoseTrial], greeting: Greeting
+) -> Sentence | None:
+    """Return that wrong answers are those of another number of sweeps, None if they are not."""
+    if not comparison.wrong or not comparison.method:
+        return None
+    for count in range(1, MOST_SWEEPS + 1):
+        if all(_is_after(count, trial, comparison.method, greeting) for trial in trials):
+            return sentence(
+                "Each answer is that after sweep {count} of {method}, whatever number is asked "
+                "for.",
+                count=count,
+                method=NAMES[comparison.method],
+            )
+    return None
+
+
+def _is_after(count: int, trial: PoseTrial, method: str, greeting: Greeting) -> bool:
+    """Return whether a pose is that after so many of the textbook's sweeps."""
+    inputs, facts = trial.case.inputs, trial.case.facts
+    _, x, _ = solve(method, {**inputs, "tolerance": 0.0, "max_iterations": count})
+    bound = rounding.sweep(greeting.epsilon, len(x), facts["size"], facts["amplification"])
+    return trial.pose.distance_to(x) <= bound
 
 
 def right_points(

@@ -24,6 +24,8 @@ from .stepping import describe_model, problems_of, telling_probes
 
 # The number of small cases in which the nearest step is sought.
 COMPARED = 4
+# A step that differs by a larger share of the displacement has nothing to say about the answers.
+NEAR = 0.1
 # The code of an unchecked factorisation.
 UNCHECKED = "PB-STEP-059"
 
@@ -130,8 +132,8 @@ def _rise(options: Sequence[Option], probe: Probe) -> bool | None:
     return not float((equation.free_gradient(start) * step).sum()) < 0.0
 
 
-def _nearest(telling: Sequence[Probe], greeting: Greeting) -> Sentence:
-    """Return which of the known steps comes nearest to the answers to the probes."""
+def _nearest(telling: Sequence[Probe], greeting: Greeting) -> Sentence | None:
+    """Return which of the known steps comes near to the answers to the probes, if any does."""
     usual = {option.aspect: option for option in honest_options((), greeting)}
     steps, choices = [], honest(greeting.step)
     for integrator, damper in product(choices["integrator"], choices["damper"]):
@@ -142,6 +144,8 @@ def _nearest(telling: Sequence[Probe], greeting: Greeting) -> Sentence:
             gaps = gaps_of(options, telling[:COMPARED], greeting.epsilon)
             steps.append((float(np.median(gaps)), max(gaps), options))
     median, worst, options = min(steps, key=lambda step: step[0])
+    if median > NEAR:
+        return None
     return sentence(
         "The nearest known step is {model}; relative to the displacement, it differs by "
         "{median:.2g} in the median small case and by {worst:.2g} in the worst.",
