@@ -316,9 +316,6 @@ class SolvedPose:
         miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
         self.equalities.add("half_turn", self.name, np.abs(turned - need / 2.0), need / 2.0)
         self.equalities.add("wrong_axis", self.name, np.abs(turned - need), miss)
-        in_degrees = np.abs((np.degrees(need) + np.pi) % (2.0 * np.pi) - np.pi)
-        gaps = (np.abs(angle - in_degrees) for angle in (turned, need))
-        self.equalities.add("turn_in_degrees", self.name, *gaps)
 
     def _ends(self, local: FloatArray) -> FloatArray:
         """Return the effector in the frame of each joint of the path, the lowest joint first."""

@@ -45,8 +45,8 @@ def with_changed_line(
     """Return a report on wrong answers with the fault or changed line that explains them.
 
     Beside a mistake that explains most answers, or where all targets are reached, the search is for
-    known faults that explain all; so it is if `known_alone`. A `contestant` can be asked for what a
-    dictionary tells apart.
+    known faults that explain all; so it is if `known_alone`, among those that are looked up. A
+    `contestant` can be asked for what a dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
@@ -68,6 +68,8 @@ def with_changed_line(
             if proposals.hint == UNSTEADY:
                 return report
             proposals = None  # without a dictionary all lines are searched
+    if known_alone and proposals is None:
+        return report
     explanations = _of_steps(report, greeting, is_known) or changed_lines(
         report, greeting, doubtful, is_known, proposals
     )
