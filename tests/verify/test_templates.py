@@ -11,28 +11,27 @@ from functools import cache
 from pathlib import Path
 
 import msgspec
-import planted_programs
 import pytest
 
 from plumbob.verify.door import open_contestant
 from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting, Step, System
-from plumbob.verify.kinematics import robot_jacobian, robot_targets
-from plumbob.verify.message import encode_case
+from plumbob.verify.message import encode_case, encode_greeting
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
+from plumbob.verify.verify import DISCIPLINES
 
 
 @cache
-def robot_case():
-    return next(iter(robot_targets.cases(Greeting(PROTOCOL, ()), "", 0, False)))
+def first_case(task):
+    method = "ccd" if task in ("inverse_kinematics", "track") else ""
+    return next(iter(DISCIPLINES[task].cases(Greeting(PROTOCOL, (task,)), method, 0, False)))
 
 
 @cache
 def all_requests():
-    """Return requests of every task that a starter offers."""
-    jacobian = next(iter(robot_jacobian.cases(Greeting(PROTOCOL, ()), "", 0, False)))
-    robots = (json.loads(encode_case(1000 + i, c)) for i, c in enumerate((robot_case(), jacobian)))
-    return [*planted_programs.requests(), *robots]
+    """Return the greeting's request and one of every task."""
+    lines = [encode_greeting(), *(encode_case(i, first_case(t)) for i, t in enumerate(TASKS, 1))]
+    return list(map(json.loads, lines))
 
 
 OFFERED = [
@@ -178,8 +177,9 @@ def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(langu
         "local_rotations": [[0.6, 0, 0.8, 0]],
     }
     request = {"id": 7, "task": "forward_kinematics", **pose}
-    (reply, of_robot), printed = ask(run, tmp_path, [request, all_requests()[-2]])
-    assert of_robot["q"] == robot_case().inputs["start"].tolist()
+    robot = first_case("robot_inverse_kinematics")
+    (reply, of_robot), printed = ask(run, tmp_path, [request, json.loads(encode_case(8, robot))])
+    assert of_robot["q"] == robot.inputs["start"].tolist()
     assert reply["positions"] == pose["offsets"]  # to the last digit
     assert reply["rotations"] == pose["local_rotations"]
     assert "stray" in printed
