@@ -18,7 +18,6 @@ LIMITS = ProcessLimits(first=60.0, request=60.0)
 rng = np.random.default_rng(4)
 MESSAGES = rng.uniform(2e-4, 6e-4, 40)
 SOLVES = rng.uniform(2e-3, 3e-2, 40)
-SIZES = np.arange(1, 41) ** 4
 
 
 def calls(claimed, computed, size=2000):

@@ -22,7 +22,6 @@ from plumbob.verify.greeting import Greeting
 from plumbob.verify.task import TASKS, Field
 
 TABLE = Field("positions", ("frame", "particle", 3))
-POINTS = Field("points", ("joint", 3))
 
 
 def chain(name="two joints", **more):

@@ -60,15 +60,6 @@ def test_no_code_has_a_larger_number_than_its_family_has_given():
         assert int(fault.code[-3:]) <= FAMILIES[fault.family]["last"], fault.code
 
 
-@pytest.mark.parametrize("code", [None, "", "PB-CCD-1", "PB-IK-001", "CCD-001", "PB-CCD-0001"])
-def test_missing_and_ill_formed_codes_are_noticed(code):
-    assert complaints([("", "", {"code": code} if code is not None else {})]) == [code]
-
-
-def test_a_code_that_stands_twice_is_noticed():
-    assert complaints([("", "", {"code": "PB-FK-001"})] * 2) == ["PB-FK-001"]
-
-
 def report_of(*codes):
     task = "forward_kinematics"
     functions = {task: faulty(task, *codes)}

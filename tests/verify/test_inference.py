@@ -6,8 +6,6 @@ import msgspec
 import numpy as np
 import pytest
 
-from plumbob.reference import Skeleton, solve_ik
-from plumbob.reference.rotation import exponential, multiply, rotate
 from plumbob.verify.functions import FunctionContestant
 from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import Verdict
@@ -254,48 +252,6 @@ def test_a_solver_that_writes_no_result_is_told_so_and_accused_of_no_combination
     assert report.verdict is Verdict.WRONG
     assert words in screen(report)
     assert all(" + " not in key for e in task.diagnosis.explanations for key in e.faults)
-
-
-def biased(how):
-    """Reach the target from a bent start that depends on the origin or on an axis."""
-
-    def solver(parents, offsets, local_rotations, tolerance, max_iterations, method, **inputs):
-        w = offsets[0] if how == "shifted" else rotate(local_rotations[0], [0.0, 0.0, 1.0])
-        bent = multiply(exponential(0.3 * np.sin(w)), local_rotations)
-        solution = solve_ik(
-            Skeleton(parents, offsets), bent, solver="levenberg_marquardt", tolerance=1e-8, **inputs
-        )
-        return {"local_rotations": solution.local_rotations}
-
-    return solver
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("how", "verdict"), [
-    ("shifted", Verdict.WRONG), ("rotated", Verdict.RIGHT_EXCEPT)])  # fmt: skip
-@pytest.mark.usefixtures("verdict_alone")
-def test_another_answer_in_another_world_is_not_right(how, verdict):
-    report = judged(IK, biased(how), methods=("mine",))
-    found = [f for j in report.tasks[0].judgements for f in j.findings if f.law == "equal worlds"]
-    assert max(finding.verdict for finding in found) is verdict
-    assert report.verdict >= verdict
-
-
-@pytest.mark.usefixtures("verdict_alone")
-def test_wrong_cases_are_shown_beside_broken_ones():
-    def crash_somewhere(**inputs):
-        if len(inputs["parents"]) == 3:
-            raise IndexError("out of range")
-        x, rotations = forward(inputs)
-        return {
-            "positions": x + (len(x) > 3) * np.arange(len(x))[:, None] ** 2,
-            "rotations": rotations,
-        }
-
-    text = screen(judged(FK, crash_somewhere))
-    assert "BROKEN cases: " in text
-    assert "WRONG cases: " in text
-    assert "yours expected" in text
 
 
 @pytest.mark.slow

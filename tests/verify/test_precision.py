@@ -26,10 +26,6 @@ from plumbob.verify.self_test import DECLARED, Stepper
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 
 
-def options_of(faults, key):
-    return [fault for fault in faults if fault.key == key][:1]
-
-
 def forward_kinematics(code):
     task = "forward_kinematics"
     return faulty(task, code) if code else textbook(task)
@@ -190,7 +186,7 @@ def test_answers_of_inputs_in_single_precision_are_judged_so_and_a_float_is_hint
     else:
         assert report.verdict is Verdict.WRONG
         explanation = report.diagnosis.explanations[0]
-    assert key in {*explanation.faults, *explanation.codes}
+        assert key in {*explanation.faults, *explanation.codes}
 
 
 @pytest.mark.sample(every=2)

@@ -1,78 +1,24 @@
-"""Faults of each family pass every writer, and no writer costs the verdict."""
+"""No writer costs the verdict."""
 
 import json
-import xml.etree.ElementTree as ET
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from plumbob.verify.door import saved
 from plumbob.verify.door.question import Question
-from plumbob.verify.functions import FunctionContestant
-from plumbob.verify.judgement import Verdict
-from plumbob.verify.screen import files, json_file, junit, page, terminal
+from plumbob.verify.fault_programs import coded_faults, contestant_of
+from plumbob.verify.screen import files, json_file, terminal
 from plumbob.verify.screen.files import Files
 from plumbob.verify.screen.words import Presentation, speaker
-from plumbob.verify.self_test import subjects
 from plumbob.verify.verify import verify
-
-
-@cache
-def faulty():
-    """Return the subjects of the self-test with a fault by their names."""
-    return {f"{subject.family}, {subject.name}": subject for subject in subjects() if subject.fault}
-
-
-def rounded(subject):
-    """Judge a subject whose answers are the last bit off: the explanation has a distance."""
-
-    def function(**inputs):
-        answer = subject.function(**inputs)
-        return {name: value * (1.0 + 2.0**-52) for name, value in answer.items()}
-
-    function.__signature__ = getattr(subject.function, "__signature__", None)
-    contestant = FunctionContestant({subject.task: function}, subject.greeting)
-    return verify(contestant)
-
-
-@pytest.mark.sample("6")
-@pytest.mark.parametrize("number", range(12))
-def test_faults_of_each_family_pass_every_writer(number, tmp_path):
-    """Every 127th fault: the list goes through all families."""
-    report = rounded(list(faulty().values())[127 * number])
-    (task,) = report.tasks
-    explanations = task.diagnosis.explanations
-    path = saved.save(task, tmp_path, 0, False)
-    if task.verdict > Verdict.RIGHT_EXCEPT:
-        assert saved.load(path).name == task.smallest_failure.case.name
-    for language in ("en", "zh"):
-        say = speaker(language)
-        context = Presentation(
-            say, language, ["my.py"], {(task.task, task.method): path} if path else {}
-        )
-        screen = "".join("".join(terminal.lines(report, context)).split())
-        record = json.loads(json_file.text(report, say), parse_constant=pytest.fail)["tasks"][0]
-        assert [one["faults"] for one in record["explanations"]] == [
-            list(one.faults) for one in explanations
-        ]
-        for one, written in zip(explanations, record["explanations"], strict=True):
-            assert (written["share"], written["distance"]) == (one.share, one.distance)
-            assert written["text"] == say(one.sentence)
-        root = ET.fromstring(junit.text(report, say).encode())
-        html = page.render(report, context)
-        if explanations:
-            told = say(explanations[0].sentence)
-            assert "".join(told.split())[:40] in screen
-            assert told in "".join(root.itertext())
-            assert told[:20].replace("'", "&#39;") in html
 
 
 @pytest.fixture(scope="module")
 def judged():
-    return rounded(faulty()["forces, gravity g/m"])
+    (fault,) = (one for one in coded_faults().values() if one.name == "gravity g/m")
+    return verify(contestant_of(fault.wrong_program))
 
 
 @pytest.fixture
