@@ -184,11 +184,13 @@ def energies(names):
     return function
 
 
-def step(gravity):
-    """Return symplectic Euler with a gravity of its own."""
+def step(own_gravity=None, own_h=None, least_damping=0.0):
+    """Return symplectic Euler with constants of its own, or a damping in the place of 0."""
 
-    def function(h, pinned, **inputs):
-        p = problem_of({**inputs, "gravity": np.array(gravity)})
+    def function(h, pinned, dampings, gravity, **inputs):
+        h, gravity = own_h or h, gravity if own_gravity is None else np.array(own_gravity)
+        dampings = np.where(dampings == 0.0, least_damping, dampings)
+        p = problem_of({**inputs, "dampings": dampings, "gravity": gravity})
         v = inputs["velocities"] + h * all_forces(p) / p.masses[:, None]
         v[pinned] = 0.0
         return {"positions": p.positions + h * v, "velocities": v}
@@ -241,29 +243,16 @@ def test_forces_without_dampers_are_right_if_declared():
     assert judged(FORCES, wrong).verdict is Verdict.WRONG
 
 
-def symplectic(own_h=None, least_damping=0.0):
-    """Return symplectic Euler with an h of its own, or a damping in the place of 0."""
-
-    def function(h, pinned, dampings, **inputs):
-        h = own_h or h
-        p = problem_of({**inputs, "dampings": np.where(dampings == 0.0, least_damping, dampings)})
-        v = inputs["velocities"] + h * all_forces(p) / p.masses[:, None]
-        v[pinned] = 0.0
-        return {"positions": p.positions + h * v, "velocities": v}
-
-    return function
-
-
 def test_a_constant_h_is_asked_about_and_right_if_declared():
-    report = judged(STEP, symplectic(own_h=0.02), **SYMPLECTIC)
+    report = judged(STEP, step(own_h=0.02), **SYMPLECTIC)
     assert report.verdict is Verdict.UNDECIDED
     assert 'declare it with "fixed": {"h": 0.02}; if not, it is a mistake' in words(report)
-    declared = judged(STEP, symplectic(own_h=0.02), fixed=Fixed(h=0.02), **SYMPLECTIC)
+    declared = judged(STEP, step(own_h=0.02), fixed=Fixed(h=0.02), **SYMPLECTIC)
     assert declared.verdict is Verdict.RIGHT
 
 
 def test_a_damping_of_zero_that_falls_back_is_said():
-    report = judged(STEP, symplectic(least_damping=1.0), **SYMPLECTIC)
+    report = judged(STEP, step(least_damping=1.0), **SYMPLECTIC)
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
     assert explanation.sentence.values == {"name": "dampings"}

@@ -5,11 +5,11 @@ import json
 import re
 import sys
 from functools import cache
-from pathlib import Path
 
 import jsonschema
 import numpy as np
 import pytest
+from protocol_page import PAGE, TRANSCRIPT
 
 from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
@@ -24,12 +24,7 @@ from plumbob.verify.message import encode_case, encode_greeting
 from plumbob.verify.task import TASKS
 from plumbob.verify.verify import DISCIPLINES
 
-PAGE = (Path(__file__).parents[2] / "docs" / "protocol.md").read_text(encoding="utf-8")
 SCHEMA = json.loads(schema.text())
-TRANSCRIPT = [
-    tuple(map(json.loads, block.splitlines()))
-    for block in re.findall(r"```json\n(.*?)```", PAGE, re.DOTALL)
-]
 SOLVED = [(request, answer) for request, answer in TRANSCRIPT[1:] if "error" not in answer]
 EVERYTHING = Greeting(PROTOCOL, tuple(TASKS))
 

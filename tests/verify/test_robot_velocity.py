@@ -113,11 +113,3 @@ def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
         nearest, found = solving((J, twist), answer)
         np.testing.assert_allclose(nearest, answer, atol=1e-12)
         assert found == pytest.approx(damping, abs=1e-6)
-
-
-@pytest.mark.slow
-def test_an_unknown_mistake_is_wrong_but_has_no_name():
-    report = report_of(lambda J, twist: 1.3 * shortest(J, twist))
-    assert report.verdict is Verdict.WRONG
-    assert not report.diagnosis.explanations
-    assert "1.3 times the right ones" in " ".join(map(str, report.diagnosis.hints))

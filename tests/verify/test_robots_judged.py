@@ -77,25 +77,20 @@ def test_angle_beyond_its_limits_by_whole_turns_is_said_to_be(turns, is_wrapped)
     assert ("whole turns" in str(limits.sentence)) is is_wrapped
 
 
+@pytest.mark.parametrize(
+    ("change", "verdict", "law"),
+    [
+        (lambda q: q + 0.01, Verdict.WRONG, "limits kept"),
+        (lambda q: np.nan * q, Verdict.BROKEN, "numbers"),
+        (lambda q: np.full_like(q, 1e300), Verdict.WRONG, "limits kept"),
+    ],
+    ids=["beyond", "no numbers", "huge"],
+)
 @pytest.mark.usefixtures("verdict_alone")
-def test_limits_that_are_left_aside_are_seen():
-    assert "limits kept" in broken(judged(lambda upper, **_: {"q": upper + 0.01}, few_cases()[:4]))
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("verdict_alone")
-def test_a_claim_that_is_not_so_is_seen_beyond_reach():
-    claiming = judged(
-        lambda **inputs: {**solve_by_reference(SOLVERS[1], **inputs), "converged": True}
-    )
-    assert broken(claiming) == {"claims"}
-
-
-@pytest.mark.parametrize("number", [np.nan, 1e300])
-@pytest.mark.usefixtures("verdict_alone")
-def test_what_is_no_coordinate_is_wrong(number):
-    report = judged(lambda start, **_: {"q": np.full_like(start, number)}, few_cases()[:4])
-    assert report.verdict is (Verdict.BROKEN if np.isnan(number) else Verdict.WRONG)
+def test_coordinates_beyond_limits_or_without_numbers_are_wrong(change, verdict, law):
+    report = judged(lambda upper, **_: {"q": change(upper)}, few_cases()[:4])
+    assert report.verdict is verdict
+    assert law in broken(report)
 
 
 @pytest.mark.parametrize("number", range(0, 40, 4))

@@ -7,115 +7,35 @@ import shutil
 import subprocess
 import sys
 import tomllib
-from functools import cache
 from pathlib import Path
 
 import msgspec
 import pytest
+from protocol_page import TRANSCRIPT
 
 from plumbob.verify.door import open_contestant
-from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting, Step, System
-from plumbob.verify.message import encode_case, encode_greeting
+from plumbob.verify.greeting import Fixed, Greeting, Step, System
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
-from plumbob.verify.verify import DISCIPLINES
 
-
-@cache
-def first_case(task):
-    method = "ccd" if task in ("inverse_kinematics", "track") else ""
-    return next(iter(DISCIPLINES[task].cases(Greeting(PROTOCOL, (task,)), method, 0, False)))
-
-
-@cache
-def all_requests():
-    """Return the greeting's request and one of every task."""
-    lines = [encode_greeting(), *(encode_case(i, first_case(t)) for i, t in enumerate(TASKS, 1))]
-    return list(map(json.loads, lines))
-
-
+REQUESTS = [request for request, _ in TRANSCRIPT]
 OFFERED = [
     "forward_kinematics", "inverse_kinematics", "mass_spring_step",
     "robot_inverse_kinematics", "robot_jacobian",
 ]  # fmt: skip
-# In each language: where the user's forward kinematics goes and what could stand there, with a
-# print and a wait of 50 ms. It puts every joint where its offset is: right for a root alone.
-FILLED = {
-    "cpp": (
-        'throw plumbob::missing("forward_kinematics");',
-        'std::puts("stray"); usleep(50000); x = offsets; r = local_rotations;',
-    ),
-    "rust": (
-        'Err("forward_kinematics is not written yet".into())',
-        'println!("stray"); std::thread::sleep(std::time::Duration::from_millis(50)); '
-        "Ok((offsets.to_vec(), local_rotations.to_vec()))",
-    ),
-    "javascript": (
-        'missing("forward_kinematics");\n    return { positions, rotations };',
-        'console.log("stray"); Atomics.wait(new Int32Array(new SharedArrayBuffer(4)), 0, 0, 50); '
-        "return { positions: offsets, rotations: local_rotations };",
-    ),
-    "go": (
-        'panic("forward_kinematics is not written yet")',
-        'fmt.Println("stray")\n\ttime.Sleep(50 * time.Millisecond)\n'
-        "\treturn offsets, localRotations",
-    ),
-    "java": (
-        'throw new RuntimeException("forward_kinematics is not written yet");',
-        'System.out.println("stray"); '
-        "try { Thread.sleep(50); } catch (InterruptedException e) { } "
-        'answer.put("positions", offsets); answer.put("rotations", localRotations);',
-    ),
-    "csharp": (
-        'throw new Exception("forward_kinematics is not written yet");',
-        '(Print("stray"), answer["positions"] = ask.offsets, '
-        'answer["rotations"] = ask.local_rotations).ToString();\n'
-        "    static int Print(string what) { Console.WriteLine(what); Thread.Sleep(50); "
-        "return 0; }",
-    ),
-    "python": (
-        'raise RuntimeError("forward_kinematics is not written yet")',
-        'print("stray"); time.sleep(0.05); '
-        'return {"positions": offsets, "rotations": local_rotations}',
-    ),
-}
-
-# What that code needs at the head of the file.
-HEADS = {
-    "go": ("package main\n\n// Par", 'package main\n\nimport ("fmt"; "time")\n\n// Par'),
-}
-
-# Likewise of robots: the tool stays where it starts.
-FILLED_ROBOT = {
-    "cpp": ('throw plumbob::missing("robot_inverse_kinematics");', "q.resize(robot.axes.size());"),
-    "rust": (
-        'Err("robot_inverse_kinematics is not written yet".into())',
-        "Ok(start[..robot.axes.len()].to_vec())",
-    ),
-    "javascript": ('missing("robot_inverse_kinematics");', ""),
-    "go": ('panic("robot_inverse_kinematics is not written yet")', "return robot.Start"),
-    "java": (
-        'throw new RuntimeException("robot_inverse_kinematics is not written yet");',
-        'answer.put("q", start);',
-    ),
-    "csharp": (
-        'throw new Exception("robot_inverse_kinematics is not written yet")',
-        'answer["q"] = ask.start',
-    ),
-    "python": (
-        'raise RuntimeError("robot_inverse_kinematics is not written yet")',
-        'return {"q": start[: len(robot["axes"])]}',
-    ),
-}
+# In each language: texts of its starter, and what could stand in their place.
+FILLED = tomllib.loads(Path(__file__).with_name("starters.toml").read_text("utf-8"))
 
 
-def build(language, folder, edit=str):
-    """Write a starter, compile it, and return what runs it; skip without its compiler.
+def build(language, folder, texts=()):
+    """Write a starter, some texts replaced, compile it, and return what runs it.
 
-    A compiler may be there without what it needs, as rustup's rustc without a toolchain.
+    Skip without its compiler, which may be there without what it needs, as rustup's rustc.
     """
     for name, text in template(language).items():
-        (folder / name).write_text(edit(text), encoding="utf-8")
+        for old, new in texts:
+            text = text.replace(old, new)
+        (folder / name).write_text(text, encoding="utf-8")
     make, run = map(shlex.split, (LANGUAGES[language].build, LANGUAGES[language].run))
     for tool in (one[0] for one in (make, run) if one and not one[0].startswith("./")):
         question = "version" if tool == "go" else "--version"
@@ -144,7 +64,7 @@ def language(request):
 @pytest.fixture(scope="module")
 def replies(language, tmp_path_factory):
     folder = tmp_path_factory.mktemp(language)
-    return ask(build(language, folder), folder, all_requests())[0]
+    return ask(build(language, folder), folder, REQUESTS)[0]
 
 
 def test_starter_greets_and_fails_only_where_code_is_missing(replies):
@@ -154,7 +74,7 @@ def test_starter_greets_and_fails_only_where_code_is_missing(replies):
     assert set(OFFERED) <= set(TASKS)
     assert greeting.language
     assert greeting.precision == "double"
-    for request, reply in zip(all_requests(), replies, strict=True):
+    for request, reply in zip(REQUESTS, replies, strict=True):
         assert reply["id"] == request["id"]
         if request["task"] in OFFERED:
             expected = f"{request['task']} is not written yet"
@@ -163,23 +83,18 @@ def test_starter_greets_and_fails_only_where_code_is_missing(replies):
 
 @pytest.mark.parametrize("language", LANGUAGES)
 def test_a_filled_in_starter_answers_and_times_itself_through_stray_prints(language, tmp_path):
-    missing, code = FILLED[language]
+    missing = FILLED[language]["texts"][0][0]
     assert sum(text.count(missing) for text in template(language).values()) == 1
-    run = build(
-        language, tmp_path,
-        lambda text: text.replace(missing, code)
-        .replace(*FILLED_ROBOT[language])
-        .replace(*HEADS.get(language, ("", ""))),
-    )  # fmt: skip
+    run = build(language, tmp_path, FILLED[language]["texts"])
     pose = {
         "parents": [-1],
         "offsets": [[0.1, 1e-17, -1e22]],
         "local_rotations": [[0.6, 0, 0.8, 0]],
     }
     request = {"id": 7, "task": "forward_kinematics", **pose}
-    robot = first_case("robot_inverse_kinematics")
-    (reply, of_robot), printed = ask(run, tmp_path, [request, json.loads(encode_case(8, robot))])
-    assert of_robot["q"] == robot.inputs["start"].tolist()
+    robot = next(one for one in REQUESTS if one["task"] == "robot_inverse_kinematics")
+    (reply, of_robot), printed = ask(run, tmp_path, [request, robot])
+    assert of_robot["q"] == robot["start"]
     assert reply["positions"] == pose["offsets"]  # to the last digit
     assert reply["rotations"] == pose["local_rotations"]
     assert "stray" in printed
@@ -216,19 +131,15 @@ def test_the_starter_reads_and_writes_vectors_of(library, tmp_path, monkeypatch)
     head, vector, quaternion = TYPES[library]
     assert vector in template("cpp")["solver.cpp"]
 
-    def edit(text):
-        for old, new in (
-            FILLED["cpp"],
-            ('#include "plumbob.hpp"\n', head + '#include "plumbob.hpp"\n'),
-            ("using Vec3 = std::array<double, 3>", f"using Vec3 = {vector}"),
-            ("using Quat = std::array<double, 4>", f"using Quat = {quaternion}"),
-        ):
-            text = text.replace(old, new)
-        return text
-
+    texts = [
+        FILLED["cpp"]["texts"][0],
+        ('#include "plumbob.hpp"\n', head + '#include "plumbob.hpp"\n'),
+        ("using Vec3 = std::array<double, 3>", f"using Vec3 = {vector}"),
+        ("using Quat = std::array<double, 4>", f"using Quat = {quaternion}"),
+    ]
     pose = {"offsets": [[0.5, 1.0, -2.0]], "local_rotations": [[0.5, -0.25, 0.75, 2.0]]}
     request = {"id": 7, "task": "forward_kinematics", "parents": [-1], **pose}
-    (reply,), _ = ask(build("cpp", tmp_path, edit), tmp_path, [request])
+    (reply,), _ = ask(build("cpp", tmp_path, texts), tmp_path, [request])
     assert (reply["positions"], reply["rotations"]) == tuple(pose.values())
 
 
