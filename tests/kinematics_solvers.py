@@ -86,7 +86,7 @@ def faulty(task, *codes, method="ccd"):
     """Return the function of a right program with known faults in its lines."""
     faults = [coded_faults()[code] for code in codes]
     own = {FORWARD: "forward kinematics", TRACK: "track"}.get(task, method)
-    source = source_of(faults[0].program if faults[0].task == task else own)
+    source = source_of(faults[0].program if faults and faults[0].task == task else own)
     for fault in faults:
         source = fault.planted_in(source)
     names = {}

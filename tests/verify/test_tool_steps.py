@@ -130,17 +130,3 @@ def test_a_known_fault_of_whole_motions_is_named():
                      exchanges=exchanges, greeting=contestant.greeting)  # fmt: skip
     (explanation, *_) = with_changed_line(report, contestant.greeting).diagnosis.explanations
     assert explanation.codes == ("PB-ROBOT-091",)
-
-
-@pytest.mark.slow
-def test_a_target_with_another_rotation_is_no_target_without_one():
-    """A tool that is always rotated in the same wrong way does not ignore rotations."""
-    right = "target = pose(matrix(target_rotation), target_position)"
-    source = source_of("tool step by screws")
-    assert source.count(right) == 1
-    turned = (
-        "matrix(target_rotation) @ exponential(np.array([0.3, 0.2, 0.1, 0, 0, 0]), 1.0)[:3, :3]"
-    )
-    report = report_of(source.replace(right, f"target = pose({turned}, target_position)"))
-    explanations = with_changed_line(report, GREETING).diagnosis.explanations
-    assert all("PB-ROBOT-008" not in explanation.codes for explanation in explanations)
