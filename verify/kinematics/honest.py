@@ -27,6 +27,8 @@ def _honest(part: str) -> Iterator[HonestSweeps]:
             yield HonestSweeps(Choices(**entry["choices"]), words)
 
 
+_ANEW = _TABLE["follow"]["frames start anew"]
+STARTS_ANEW = with_code(_ANEW["code"], Sentence(_ANEW["sentence"], {}))
 STOPS = tuple(_honest("stop"))
 HONEST: Mapping[str, tuple[HonestSweeps, ...]] = {
     "ccd": (*_honest("ccd"), *STOPS),

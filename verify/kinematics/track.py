@@ -20,6 +20,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import HOLDS, finding, judge_case
 from . import pose_laws, problems, rounding, skeletons, sweeps
+from .honest import STARTS_ANEW
 from .inverse_kinematics import METHODS
 from .pose_laws import AnsweredPose
 from .predictions import forward, predict_track
@@ -168,7 +169,7 @@ def _continues(exchange: Exchange, method: str, greeting: Greeting) -> Finding:
         difference(predict_track(method, exchange.case, starts_anew), answer.values)
         for starts_anew in (False, True)
     )
-    return finding(CONTINUES, float(warm > bound >= cold))
+    return finding(CONTINUES, float(warm > bound >= cold), choice=STARTS_ANEW)
 
 
 def _frame_laws(frames: Sequence[Frame], greeting: Greeting) -> list[Finding]:
