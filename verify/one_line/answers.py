@@ -12,6 +12,7 @@ from ..contestant import Answer, Exchange, Failure
 from ..gaps import difference
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..kinematics.sweeps import ROUNDED, PoseTrial
+from ..kinematics.textbook import SOLVERS as METHODS
 from ..laws import LAWS
 from .mutants import Program
 from .right_programs import comparable
@@ -53,7 +54,8 @@ def doubtful_answers(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
     ]
     if differing:
         return differing, False
-    if short := [j for j in report.judgements if _misses(j, "nearest point")]:
+    short = [j for j in report.judgements if _misses(j, "nearest point")]
+    if short and report.method in METHODS:
         return short, True
     limited = [j for j in report.judgements if "cones" in j.case.inputs]
     is_missed = any(_misses(judgement, "target reached") for judgement in limited)
