@@ -137,7 +137,7 @@ def _row(
     row = np.full((len(cases), len(OUTPUTS[cases[0].task])), np.nan)
     for i, case in enumerate(cases):
         if is_solve(case) and (_is_wrong(row) or not with_solves):
-            break
+            continue
         with suppress(Exception):  # of a changed program any may come
             row[i] = keys(run(case), right[i], case)
     return row if _is_wrong(row) else None
