@@ -208,7 +208,7 @@ class Attempt:
         return _with_cause(report, causes)
 
     def _diagnosis(self, search: CauseSearch, is_placed: bool, report: TaskReport) -> Diagnosis:
-        """Return what answers show beside changed lines."""
+        """Return the diagnosis before lines are changed."""
         greeting = report.greeting or self.contestant.greeting
         answers = JudgedAnswers(report, greeting, search, is_placed)
         return DISCIPLINES[self.task].diagnose(answers)

@@ -1,4 +1,4 @@
-"""What answers of wrong inverse kinematics show beside the lines of programs."""
+"""Ends of solves, claims and readings of limits that wrong poses show."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What answers of wrong motions along curves show beside the lines of programs."""
+"""Claims of wrong motions along curves."""
 
 from ..cause_search import JudgedAnswers
 from ..judgement import Diagnosis

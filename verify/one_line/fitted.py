@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray
@@ -110,4 +110,5 @@ def _constants(
     if factor <= 0.0 or np.linalg.norm(factor * rows[best] - goal) > NEAR * size:
         return None
     start = np.array([(*DAMPINGS, *BETWEEN)[best], np.log(factor)])
-    return np.asarray(least_squares(lambda c: (turns(c) - goal) / size, start, **METHOD).x)
+    solve = scipy.optimize.least_squares
+    return np.asarray(solve(lambda c: (turns(c) - goal) / size, start, **METHOD).x)
