@@ -120,14 +120,9 @@ def changed_lines(
     If `is_known`, the search is for known faults alone. Where a dictionary proposes changes, these
     are tried; the lines of its first program, if answers to all its requests are right.
     """
-    compared = compared_answers(report, doubtful)
+    compared, tolerance = _compared(report, greeting, doubtful)
     if not compared:
         return ()
-    tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
-    tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
-    compared = without_near(compared, report, tolerance)
-    if report.task == tool_steps.MOTIONS:
-        compared = compared[: tool_steps.MAX_MOTIONS]
     has_limits = any("cones" in exchange.case.inputs for exchange in compared)
     programs = [
         program
@@ -160,6 +155,18 @@ def changed_lines(
         for program in programs[: 1 if report.task in OF_STEPS else None]:
             best = best or of_numbers(program, report, compared, tolerance)
     return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _compared(
+    report: TaskReport, greeting: Greeting, doubtful: Sequence[CaseJudgement]
+) -> tuple[list[Exchange], float]:
+    """Return the answers that programs have to give, and the relative difference of equal ones."""
+    compared = compared_answers(report, doubtful)
+    tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
+    tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
+    compared = without_near(compared, report, tolerance)
+    is_motion = report.task == tool_steps.MOTIONS
+    return compared[: tool_steps.MAX_MOTIONS if is_motion else None], tolerance
 
 
 def _of_programs(
