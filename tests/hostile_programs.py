@@ -8,8 +8,8 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.door import ProcessLimits
-from plumbob.verify.door.program import ProgramContestant
+from plumbob.verify.connections import ProcessLimits
+from plumbob.verify.connections.program import ProgramConnection
 
 # The first request may wait for a busy machine; the others come when the program is warm.
 LIMITS = ProcessLimits(
@@ -44,9 +44,9 @@ while True:
 def program(tmp_path, misbehave, limits=LIMITS, loop=LOOP):
     """A program that does a piece of Python when it is asked for three joints."""
     body = "".join(f"    {line}\n" for line in misbehave.splitlines())
-    file = tmp_path / "contestant.py"
+    file = tmp_path / "connection.py"
     file.write_text(f"{PRELUDE}\ndef misbehave(request):\n{body}\n{loop}", encoding="utf-8")
-    return ProgramContestant([sys.executable, "-I", "-S", str(file)], limits=limits)
+    return ProgramConnection([sys.executable, "-I", "-S", str(file)], limits=limits)
 
 
 def case(joints):

@@ -9,7 +9,7 @@ from plumbob.reference import Skeleton, forward_kinematics, solve_ik, track
 from plumbob.verify.case import Case
 from plumbob.verify.cause_search import CauseSearch, JudgedAnswers
 from plumbob.verify.fault_programs import coded_faults, source_of
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.predictions import TEXTBOOK, forward, predict_track, solve
@@ -43,14 +43,14 @@ HONEST = {
 def judged(task, function, method="", seed=0, **greeting):
     """Return the report on a function."""
     said = Greeting(1, (task,), methods=(method,), **greeting)
-    return verify(FunctionContestant({task: function}, said), seed=seed).tasks[0]
+    return verify(FunctionConnection({task: function}, said), seed=seed).tasks[0]
 
 
 def judged_some(task, function, method="", every=5):
     """Return the report on a function that is asked one case of so many."""
     said = Greeting(1, (task,), methods=(method,))
     cases = DISCIPLINES[task].cases(said, method, 0, False)[::every]
-    return judge_cases(FunctionContestant({task: function}, said), task, method, cases)
+    return judge_cases(FunctionConnection({task: function}, said), task, method, cases)
 
 
 def explained(task, exchanges, greeting, base=None):

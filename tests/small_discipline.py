@@ -5,7 +5,7 @@ import numpy as np
 from plumbob.reference import Skeleton, forward_kinematics, rotation, scenes, solve_ik
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.explain import Variant, explain
 from plumbob.verify.gaps import difference
 from plumbob.verify.judgement import (

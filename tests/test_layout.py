@@ -21,7 +21,7 @@ ROOMS = {
     "plumbob": {"reference", "crosscheck", "verify", "bench", *GROUND},
 }
 # What the bench may use of the judge: how a solver is asked.
-ASKING = {"case", "contestant", "door", "greeting", "message", "kinematics.robot_models"}
+ASKING = {"case", "connections", "exchange", "greeting", "message", "kinematics.robot_models"}
 # Lines by room; a later change lowers them, and a reason stands beside a raised one.
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LINES = PROJECT["tool"]["plumbob"]["lines"]
@@ -199,7 +199,7 @@ SLIPS = [
 FINE = [
     ("reference/formats/a.py", "from pathlib import Path\nopen(Path('a'))"),
     ("crosscheck/a.py", "import mujoco\nfrom plumbob.reference import Skeleton\nfrom . import a"),
-    ("bench/a.py", "from plumbob.verify.door import open_contestant"),
+    ("bench/a.py", "from plumbob.verify.connections import open_connection"),
     ("plumbob/__init__.py", "from .reference import *\ndef __getattr__(name):\n    return 1"),
     ("plumbob/cli/main.py", "from plumbob.bench import text\ndef main():\n    return text"),
     ("bench/a.py", "import time\nfrom plumbob.crosscheck.verdict import a\nprint(time.time())"),
@@ -273,7 +273,7 @@ DIAGNOSIS = {
         "claims", "early_ends", "faults")),
     *(f"mass_spring/{name}" for name in ("faults", "iterations", "relations", "search")),
 }  # fmt: skip
-BOTH = {"verify", "disciplines", "self_test", "pytest_laws", "door", "screen", "templates"}
+BOTH = {"verify", "disciplines", "self_test", "pytest_laws", "connections", "screen", "templates"}
 
 
 def explains(parts):

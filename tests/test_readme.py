@@ -13,7 +13,7 @@ from plumbob.cli import main as cli
 from plumbob.text.language import translator
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer
+from plumbob.verify.exchange import Answer
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
     CaseJudgement,

@@ -17,7 +17,7 @@ from plumbob.bench.motion.motion import Scene
 from plumbob.bench.show import picture, scenes
 from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.bench.show.scenes import CLOTH, EXACT
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.mass_spring.model import Integrator, StepModel
 from plumbob.verify.self_test import STEP, Stepper, Subject, subjects
@@ -79,7 +79,7 @@ def beside_truth(solver: str, faults: Sequence[FamousFault]) -> Scene:
 def solver_of(fault: FamousFault) -> SceneSolver:
     """Return the solver that has a fault."""
     subject = subject_of(fault)
-    solver = FunctionContestant({subject.task: subject.function}, subject.greeting)
+    solver = FunctionConnection({subject.task: subject.function}, subject.greeting)
     return SceneSolver(fault.title, solver)
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 
 from plumbob.text.sentence import Sentence, sentence
 
-from .contestant import Exchange
+from .exchange import Exchange
 from .greeting import Greeting
 from .judgement import TaskReport
 

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 from .case import Case
-from .contestant import Answer, Contestant, Exchange
+from .exchange import Answer, Connection, Exchange
 from .gaps import largest_gap
 from .greeting import Fixed
 from .judgement import TaskReport, Verdict
@@ -51,7 +51,7 @@ class Constant(NamedTuple):
     is_own: bool = True  # whether answers show that it is the program's, and no other near it
 
 
-def is_unread(contestant: Contestant, report: TaskReport, name: str) -> bool:
+def is_unread(connection: Connection, report: TaskReport, name: str) -> bool:
     """Return whether the largest requests get the same answers with two values of an input."""
     cases = [
         judgement.case
@@ -61,26 +61,26 @@ def is_unread(contestant: Contestant, report: TaskReport, name: str) -> bool:
     ]
     first, second = CHANGES[name]
     for case in sorted(cases, key=lambda case: -case.size)[:TRIALS]:
-        one, other = (_outputs(contestant, case, {**first, **change}) for change in (first, second))
+        one, other = (_outputs(connection, case, {**first, **change}) for change in (first, second))
         names = one.keys() - CLAIMS
         if not names or any(largest_gap(one[n], other.get(n, np.inf)) > SAME for n in names):
             return False
     return bool(cases)
 
 
-def _outputs(contestant: Contestant, case: Case, change: Mapping[str, Any]) -> Mapping[str, Any]:
+def _outputs(connection: Connection, case: Case, change: Mapping[str, Any]) -> Mapping[str, Any]:
     """Return the outputs of the answer to a changed request, {} without an answer."""
-    answer = contestant.answer(replace(case, inputs={**case.inputs, **change}))
+    answer = connection.answer(replace(case, inputs={**case.inputs, **change}))
     return answer.values if isinstance(answer, Answer) else {}
 
 
-def tolerance(contestant: Contestant, report: TaskReport) -> Constant | None:
+def tolerance(connection: Connection, report: TaskReport) -> Constant | None:
     """Return the least round number above the distances at which solves end [m].
 
     It is 0 if they end as near as they are asked to, None if most end far from their targets, or do
     not make the sweeps of their method.
     """
-    if max_iterations(contestant, report) is None:
+    if max_iterations(connection, report) is None:
         return None
     ends = [
         (finding, judgement.case.facts)
@@ -96,7 +96,7 @@ def tolerance(contestant: Contestant, report: TaskReport) -> Constant | None:
     near = [error for error, reach in pairs if 0.0 < error <= min(LOOSEST * reach, FARTHEST)]
     if len(near) < len(ends) / 2:
         return None
-    smaller = _ends_of_smaller(contestant, report)
+    smaller = _ends_of_smaller(connection, report)
     value = _round_bound(near)
     return Constant(value, bool(smaller) and _round_bound(smaller) == value)
 
@@ -107,7 +107,7 @@ def _round_bound(ends: Sequence[float]) -> float:
     return next(float(f"{n * power:.1g}") for n in (1, 2, 5, 10) if n * power >= max(ends))
 
 
-def _ends_of_smaller(contestant: Contestant, report: TaskReport) -> list[float]:
+def _ends_of_smaller(connection: Connection, report: TaskReport) -> list[float]:
     """Return the distances at which solves of smaller skeletons end [m], () of tracks."""
     distances = []
     for case in (judgement.case for judgement in report.judgements):
@@ -116,33 +116,33 @@ def _ends_of_smaller(contestant: Contestant, report: TaskReport) -> list[float]:
             continue
         lengths = {name: SCALE * case.inputs[name] for name in ("offsets", "target")}
         inputs = {**case.inputs, **lengths}
-        outputs = _outputs(contestant, case, lengths)
+        outputs = _outputs(connection, case, lengths)
         distance = read_pose(outputs, inputs, case.facts).distance
         distances += [distance] if case.facts["least"] == 0.0 and distance > 0.0 else []
     return [distance for distance in distances if distance <= FARTHEST]
 
 
-def max_iterations(contestant: Contestant, report: TaskReport) -> Constant | None:
+def max_iterations(connection: Connection, report: TaskReport) -> Constant | None:
     """Return the number of sweeps that a solver makes, of other solvers the number allowed.
 
     It is None if a solver does not make the sweeps of its method.
     """
-    count = _sweeps(contestant, report)
+    count = _sweeps(connection, report)
     if count is None and report.method.lower() in SOLVERS:
         return None
     is_own = count not in (None, MOST_SWEEPS)
     return Constant(count if is_own else problems.ALLOWED, is_own)
 
 
-def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
+def _sweeps(connection: Connection, report: TaskReport) -> int | None:
     """Return the number of a textbook's sweeps that a solver makes, None if it makes no such.
 
     Targets are beyond reach, so that only the number of sweeps ends a solve.
     """
     fixed = Fixed(max_iterations=1, tolerance=problems.LOOSE)
-    greeting = msgspec.structs.replace(contestant.greeting, fixed=fixed)
+    greeting = msgspec.structs.replace(connection.greeting, fixed=fixed)
     cases = [c for c in problems.cases(greeting, "", 0, False) if "sweeps" in c.facts][:TRIALS]
-    trials = [PoseTrial(_exchange(contestant, report, case)) for case in cases]
+    trials = [PoseTrial(_exchange(connection, report, case)) for case in cases]
     if not trials or not all(trial.pose.finite for trial in trials):
         return None
     methods = [m for m in SOLVERS if m == report.method.lower()] or SOLVERS
@@ -155,12 +155,12 @@ def _sweeps(contestant: Contestant, report: TaskReport) -> int | None:
     return int(np.argmin(best)) + 1 if best.min() <= STALL["single"] else None
 
 
-def _exchange(contestant: Contestant, report: TaskReport, case: Case) -> Exchange:
+def _exchange(connection: Connection, report: TaskReport, case: Case) -> Exchange:
     """Return a case of inverse kinematics with the answer, of a track its first frame."""
     inputs = {**case.inputs, "method": report.method}
     if report.task == "track":
         inputs["curve"] = inputs.pop("target")[None]
-    outputs = _outputs(contestant, replace(case, task=report.task, inputs=inputs), {})
+    outputs = _outputs(connection, replace(case, task=report.task, inputs=inputs), {})
     frame = 0 if report.task == "track" else slice(None)
     answer = Answer({name: outputs[name][frame] for name in outputs.keys() - CLAIMS}, 0.0)
     return Exchange(case, answer, answer)
@@ -175,14 +175,14 @@ def _gaps(trial: PoseTrial, method: str, root_first: bool) -> list[float]:
     return gaps
 
 
-def gravity(contestant: Contestant, report: TaskReport) -> Constant | None:
+def gravity(connection: Connection, report: TaskReport) -> Constant | None:
     """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
     case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
     if case is None:
         return None
     x, masses, h = (case.inputs.get(name, 1.0) for name in ("positions", "masses", "h"))
     at_rest = {"velocities": np.zeros_like(x)}
-    outputs = _outputs(contestant, case, at_rest)
+    outputs = _outputs(connection, case, at_rest)
     if "forces" in outputs:
         g = outputs["forces"][0] / masses[0]
     elif "velocities" in outputs:
@@ -190,7 +190,7 @@ def gravity(contestant: Contestant, report: TaskReport) -> Constant | None:
     elif "positions" in outputs:
         g = (outputs["positions"].reshape(-1, *x.shape)[0, 0] - x[0]) / h**2
     elif name := next((name for name in ENERGIES if name in outputs), None):
-        lifted = (_outputs(contestant, case, at_rest | {"positions": x + e}) for e in np.eye(3))
+        lifted = (_outputs(connection, case, at_rest | {"positions": x + e}) for e in np.eye(3))
         g = [(outputs[name] - other.get(name, np.nan)) / masses.sum() for other in lifted]
     else:
         return None
@@ -200,14 +200,14 @@ def gravity(contestant: Contestant, report: TaskReport) -> Constant | None:
     return Constant([float(f"{component:.6g}") for component in g])
 
 
-def step_length(contestant: Contestant, report: TaskReport) -> Constant | None:
+def step_length(connection: Connection, report: TaskReport) -> Constant | None:
     """Return by how much a free particle moves for 1 m/s more [s], None if answers do not tell."""
     case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
     if case is None:
         return None
     x = case.inputs["positions"]
     answers = [
-        _outputs(contestant, case, {"velocities": np.full_like(x, speed)}) for speed in (0.0, 1.0)
+        _outputs(connection, case, {"velocities": np.full_like(x, speed)}) for speed in (0.0, 1.0)
     ]
     if not all("positions" in answer for answer in answers):
         return None
@@ -217,7 +217,7 @@ def step_length(contestant: Contestant, report: TaskReport) -> Constant | None:
 
 
 # How the constants in place of inputs are measured.
-MEASURES: Mapping[str, Callable[[Contestant, TaskReport], Constant | None]] = {
+MEASURES: Mapping[str, Callable[[Connection, TaskReport], Constant | None]] = {
     "tolerance": tolerance, "max_iterations": max_iterations, "gravity": gravity,
     "h": step_length,
 }  # fmt: skip

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 from .case import Case
 from .cause_search import JudgedAnswers
-from .contestant import Exchange
+from .exchange import Exchange
 from .greeting import Greeting
 from .judgement import Diagnosis, TaskReport
 from .kinematics import (

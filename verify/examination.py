@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from .contestant import Contestant, Exchange
+from .exchange import Connection, Exchange
 from .greeting import Greeting
 from .judgement import TaskReport
 
@@ -12,7 +12,7 @@ class Examination(Protocol):
     """A solver at a task."""
 
     @property
-    def contestant(self) -> Contestant:
+    def connection(self) -> Connection:
         """The solver."""
 
     def judge(self, greeting: Greeting, exchanges: Sequence[Exchange] | None = None) -> TaskReport:

@@ -14,7 +14,7 @@ import numpy as np
 from plumbob.text.sentence import Sentence, sentence
 
 from .case import Case
-from .contestant import Answer, Exchange
+from .exchange import Answer, Exchange
 from .gaps import difference
 from .judgement import LEAST_SHARE, Explanation
 

@@ -16,8 +16,8 @@ from typing import Any, NamedTuple
 
 from plumbob.text.sentence import Sentence
 
-from .door.host import PythonSolver
-from .functions import FunctionContestant
+from .connections.host import PythonSolver
+from .functions import FunctionConnection
 from .message import decode_greeting
 
 FOLDER = Path(__file__).parent
@@ -192,9 +192,9 @@ def _faults_of(part: Any) -> Iterator[CodedFault]:
         yield CodedFault(entry["code"], name.format(**values), words, program, lines)
 
 
-def contestant_of(program: str) -> FunctionContestant:
-    """Return the functions of a program's source as a contestant of this process."""
+def connection_to(program: str) -> FunctionConnection:
+    """Return the functions of a program's source as a connection of this process."""
     names: dict[str, Any] = {}
     exec(compile(program, "program", "exec"), names)
     solver = PythonSolver(names, "program", names.get("PLUMBOB", {}))
-    return FunctionContestant(solver.functions, decode_greeting(solver.greeting, "program"))
+    return FunctionConnection(solver.functions, decode_greeting(solver.greeting, "program"))

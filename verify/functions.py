@@ -1,4 +1,4 @@
-"""Functions of Python as a contestant, and the values that they may return."""
+"""Functions of Python as a connection, and the values that they may return."""
 
 import contextlib
 import inspect
@@ -14,7 +14,7 @@ import numpy as np
 from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .case import Case
-from .contestant import Answer, Failure, FailureKind, Functions
+from .exchange import Answer, Failure, FailureKind, Functions
 from .greeting import Greeting
 from .task import TASKS, Field, Task
 
@@ -24,7 +24,7 @@ MOST_POINTS = 1000
 _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolean": np.bool_}
 
 
-class FunctionContestant:
+class FunctionConnection:
     """Functions called in this process, by the names of tasks or methods of inverse kinematics."""
 
     remarks: tuple[Sentence, ...] = ()

@@ -21,8 +21,8 @@ from plumbob.text.sentence import Sentence, sentence
 from . import precision
 from .case import Case
 from .constants import MEASURES, is_unread
-from .contestant import Answer, Contestant, Failure, is_hung
 from .examination import Examination
+from .exchange import Answer, Connection, Failure, is_hung
 from .gaps import largest_gap
 from .greeting import Greeting
 from .judgement import TaskReport, Verdict
@@ -52,7 +52,7 @@ class Restriction(NamedTuple):
     greeting: Mapping[str, Any]  # the fields that declare it
     about: Sentence  # what it is judged on
     sentence: Sentence  # how its answers show that
-    asks: bool = False  # whether it is a mistake unless the greeting declares it
+    needs_declaration: bool = False  # whether it is a mistake unless the greeting declares it
     detection: str = "replaced"  # what shows it, a key of `_DETECTORS`
     unused: bool = False  # whether answers do not depend on it at all
     tasks: Sequence[str] = tuple(TASKS)  # those that it is inferred of
@@ -100,8 +100,8 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     Of restrictions that make it right the fewest are taken; a solver that is wrong with them too
     gets both said.
     """
-    contestant = examination.contestant
-    greeting = contestant.greeting
+    connection = examination.connection
+    greeting = connection.greeting
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
     if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
         return report
@@ -110,9 +110,9 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         (r, why)
         for r in RESTRICTIONS
         if not is_sound or r.measured
-        if (why := _evidence(contestant, report, r))
+        if (why := _evidence(connection, report, r))
     ]
-    known = [(_with_constant(contestant, report, restriction), why) for restriction, why in shown]
+    known = [(_with_constant(connection, report, restriction), why) for restriction, why in shown]
     evidence = [(restriction, why) for restriction, why in known if restriction]
     unknown = [r for (r, _), (measured, _) in zip(shown, known, strict=True) if measured is None]
     if not evidence:
@@ -163,13 +163,13 @@ def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
 
 
 def _with_constant(
-    contestant: Contestant, report: TaskReport, restriction: Restriction
+    connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Restriction | None:
     """Return a restriction with the constant in place of its input, None if it does not show."""
     name = restriction.input
     if not restriction.measured:
         return restriction
-    constant = MEASURES[name](contestant, report)
+    constant = MEASURES[name](connection, report)
     if constant is None:
         return None
     about = Sentence(restriction.about.template, {"value": constant.value})
@@ -205,49 +205,51 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
         for restriction, why in evidence
     ]
     declaration = _declaration(evidence)
-    is_asked = any(restriction.asks for restriction, _ in evidence)
+    needs_declaration = any(restriction.needs_declaration for restriction, _ in evidence)
     notes.append(
         sentence("If that is meant, declare it with {declaration}; if not, it is a mistake.",
                  declaration=declaration)
-        if is_asked
+        if needs_declaration
         else sentence("Declare it with {declaration}.", declaration=declaration)
     )  # fmt: skip
     if any(restriction.is_assumed for restriction, _ in evidence):
         notes.append(NUMBER)
     assumptions = (*best.assumptions, *notes)
-    return replace(best, assumptions=assumptions, is_asked=is_asked, original=report)
+    return replace(
+        best, assumptions=assumptions, needs_declaration=needs_declaration, original=report
+    )
 
 
 def _evidence(
-    contestant: Contestant, report: TaskReport, restriction: Restriction
+    connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return how answers show that a solver does not take an input.
 
     Return None if they do not, or if the greeting declares it.
     """
-    greeting, is_tried = contestant.greeting, report.task in restriction.tasks
+    greeting, is_tried = connection.greeting, report.task in restriction.tasks
     if restriction.greeting and restricted(greeting, [(restriction, UNRELATED)]) == greeting:
         return None
-    return _DETECTORS[restriction.detection](contestant, report, restriction) if is_tried else None
+    return _DETECTORS[restriction.detection](connection, report, restriction) if is_tried else None
 
 
 def _constant(
-    contestant: Contestant, report: TaskReport, restriction: Restriction
+    connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return that answers do not depend on an input, None if they do or it is declared."""
-    is_open = getattr(contestant.greeting.fixed, restriction.input) is None
-    is_constant = is_open and is_unread(contestant, report, restriction.input)
+    is_undeclared = getattr(connection.greeting.fixed, restriction.input) is None
+    is_constant = is_undeclared and is_unread(connection, report, restriction.input)
     return restriction.sentence if is_constant else None
 
 
-def _points(_: Contestant, report: TaskReport, restriction: Restriction) -> Sentence | None:
+def _points(_: Connection, report: TaskReport, restriction: Restriction) -> Sentence | None:
     """Return that answers to targets are positions alone, None if they are not."""
     answers = [j.answer.values for j in report.judgements if isinstance(j.answer, Answer)]
     are_points = bool(answers) and all("local_rotations" not in values for values in answers)
     return restriction.sentence if "target" in _inputs_of(report) and are_points else None
 
 
-def _plane(_: Contestant, report: TaskReport, restriction: Restriction) -> Sentence | None:
+def _plane(_: Connection, report: TaskReport, restriction: Restriction) -> Sentence | None:
     """Return that answers stay in the plane z = 0, or that none come; None if they do not."""
     answers = [(j.case, j.answer.values) for j in report.judgements if isinstance(j.answer, Answer)]
     if not {"offsets", "positions"} & _inputs_of(report):
@@ -273,7 +275,7 @@ def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
 
 
 def _unchanged(
-    contestant: Contestant, report: TaskReport, restriction: Restriction
+    connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return how an input does not change answers, None if it does; the other inputs are plain."""
     name, names, pairs = restriction.input, _inputs_of(report), []
@@ -287,17 +289,17 @@ def _unchanged(
             pairs.append([replace(case, inputs=_with_urdf(inputs)) for inputs in (plain, full)])
     reason = None
     for plain_case, full_case in pairs[:TRIALS]:
-        answer = contestant.answer(plain_case)
-        reason = _reason(answer, contestant.answer(full_case), restriction)
+        answer = connection.answer(plain_case)
+        reason = _reason(answer, connection.answer(full_case), restriction)
         if reason is None:
             return None
-        if _is_unused(contestant, plain_case, answer, restriction) is not restriction.unused:
+        if _is_unused(connection, plain_case, answer, restriction) is not restriction.unused:
             return None
     return reason
 
 
 def _unread(
-    contestant: Contestant, report: TaskReport, restriction: Restriction
+    connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
     """Return how requests with an input that others lack show that it is not taken, None if not."""
     name = restriction.input
@@ -306,21 +308,21 @@ def _unread(
         return None
     if all(isinstance(answer, Failure) for _, answer in pairs):
         return UNRELATED
-    return restriction.sentence if all(_keeps(contestant, *pair, name) for pair in pairs) else None
+    return restriction.sentence if all(_keeps(connection, *pair, name) for pair in pairs) else None
 
 
-def _keeps(contestant: Contestant, case: Case, answer: Answer | Failure, name: str) -> bool:
+def _keeps(connection: Connection, case: Case, answer: Answer | Failure, name: str) -> bool:
     """Return whether an answer stays the same with twice an input."""
-    doubled = contestant.answer(replace(case, inputs={**case.inputs, name: 2 * case.inputs[name]}))
+    doubled = connection.answer(replace(case, inputs={**case.inputs, name: 2 * case.inputs[name]}))
     return isinstance(answer, Answer) and isinstance(doubled, Answer) and _are_same(answer, doubled)
 
 
 def _is_unused(
-    contestant: Contestant, case: Case, answer: Answer | Failure, restriction: Restriction
+    connection: Connection, case: Case, answer: Answer | Failure, restriction: Restriction
 ) -> bool:
     """Return whether answers do not even depend on the first of many numbers, or on gravity."""
     name = restriction.input
-    return name in ("gravity", *_SHARED) and _keeps(contestant, case, answer, name)
+    return name in ("gravity", *_SHARED) and _keeps(connection, case, answer, name)
 
 
 def _with_urdf(inputs: Mapping[str, Any]) -> Mapping[str, Any]:
@@ -350,7 +352,7 @@ def _reason(
 
 
 # What shows a restriction; each returns how, or None if it does not show.
-_DETECTORS: Mapping[str, Callable[[Contestant, TaskReport, Restriction], Sentence | None]] = {
+_DETECTORS: Mapping[str, Callable[[Connection, TaskReport, Restriction], Sentence | None]] = {
     "replaced": _unchanged, "constant": _constant, "absent": _unread, "points": _points,
     "plane": _plane,
 }  # fmt: skip
@@ -363,16 +365,16 @@ def _are_same(first: Answer, second: Answer) -> bool:
     )
 
 
-def methods_of(contestant: Contestant, cases: Sequence[Case]) -> tuple[str, ...]:
+def methods_of(connection: Connection, cases: Sequence[Case]) -> tuple[str, ...]:
     """Return the methods of inverse kinematics that a solver declares, or that its answers show.
 
     Methods show where an answer to one of the cases differs by the request's method, or only comes
     if it names one.
     """
-    declared = contestant.greeting.methods
+    declared = connection.greeting.methods
     for case in cases if declared == ("",) else ():
         answers = {
-            method: contestant.answer(replace(case, inputs={**case.inputs, "method": method}))
+            method: connection.answer(replace(case, inputs={**case.inputs, "method": method}))
             for method in ("", *METHODS)
         }
         offered = {m: answer for m, answer in answers.items() if isinstance(answer, Answer)}

@@ -9,7 +9,7 @@ from typing import Any
 from plumbob.text.sentence import Sentence, codes_in, sentence
 
 from .case import Case
-from .contestant import Answer, Exchange, Failure
+from .exchange import Answer, Exchange, Failure
 from .greeting import Greeting
 
 # The least share of the answers that a likely fault reproduces.
@@ -141,7 +141,7 @@ class TaskReport:
     diagnosis: Diagnosis
     # what it is judged by instead of the greeting: another precision, chains only, one mass
     assumptions: tuple[Sentence, ...] = ()
-    is_asked: bool = False  # whether something assumed is a mistake unless it is declared
+    needs_declaration: bool = False  # whether something assumed is a mistake unless it is declared
     exchanges: Sequence[Exchange] = ()
     greeting: Greeting | None = None  # by which they are judged
     original: "TaskReport | None" = None  # by the solver's own greeting, if it is judged by another
@@ -159,7 +159,7 @@ class TaskReport:
         """
         verdicts = (judgement.verdict for judgement in self.judgements)
         worst = max(verdicts, default=Verdict.UNDECIDED)
-        if self.is_asked:
+        if self.needs_declaration:
             return max(worst, Verdict.UNDECIDED)
         return max(worst, Verdict.RIGHT_EXCEPT) if self.assumptions else worst
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from plumbob.text.sentence import Sentence, with_code
 
-from .contestant import Answer, Contestant, is_hung
 from .examination import Examination
+from .exchange import Answer, Connection, is_hung
 from .gaps import difference
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
@@ -27,12 +27,12 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     Other mistakes that explain such answers do so by chance, except of steps, where a matrix or a
     state is kept.
     """
-    contestant = examination.contestant
+    connection = examination.connection
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
-    if report.verdict < Verdict.WRONG or contestant.greeting.system.continues or is_stuck:
+    if report.verdict < Verdict.WRONG or connection.greeting.system.continues or is_stuck:
         return report
     wrong = [judgement for judgement in report.judgements if _is_steady(judgement)]
-    share = _changed_share(contestant, wrong[-REQUESTS:])
+    share = _changed_share(connection, wrong[-REQUESTS:])
     if not share:
         return report
     words = with_code(FAULT["code"], Sentence(FAULT["sentence"], {}))
@@ -50,12 +50,12 @@ def _is_steady(judgement: CaseJudgement) -> bool:
     return isinstance(judgement.answer, Answer) and bool(laws) and "equal answers" not in laws
 
 
-def _changed_share(contestant: Contestant, judgements: Sequence[CaseJudgement]) -> float:
+def _changed_share(connection: Connection, judgements: Sequence[CaseJudgement]) -> float:
     """Return the share of answers that differ when asked again, the last answer first."""
-    contestant.close()
+    connection.close()
     changed = 0
     for judgement in reversed(judgements):
-        before, answer = judgement.answer, contestant.answer(judgement.case)
+        before, answer = judgement.answer, connection.answer(judgement.case)
         assert isinstance(before, Answer)
         changed += not isinstance(answer, Answer) or difference(before.values, answer.values) > SAME
     return changed / max(len(judgements), 1)

@@ -11,7 +11,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
-from .contestant import Answer, Exchange
+from .exchange import Answer, Exchange
 from .gaps import largest_gap
 from .judgement import CaseJudgement, Finding, Verdict
 from .timing import time_call

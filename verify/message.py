@@ -23,7 +23,7 @@ from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .case import Case
-from .contestant import Answer, Failure, FailureKind
+from .exchange import Answer, Failure, FailureKind
 from .functions import checked, raised, understand
 from .greeting import MOST_ITERATIONS, PROTOCOL, Greeting
 from .task import TASKS, Task

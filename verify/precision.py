@@ -10,8 +10,8 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence, sentence
 
-from .contestant import Answer, Exchange
 from .examination import Examination
+from .exchange import Answer, Exchange
 from .greeting import Greeting
 from .judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 

@@ -6,9 +6,9 @@ from typing import Any
 
 from plumbob.text.printable import harmless, visible
 
+from .connections.host import PythonSolver
 from .disciplines import DISCIPLINES
-from .door.host import PythonSolver
-from .functions import FunctionContestant
+from .functions import FunctionConnection
 from .judgement import LEAST_SHARE, TaskReport, Verdict
 from .message import decode_greeting
 from .verify import judge_cases, trials
@@ -47,15 +47,15 @@ def laws(
     declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
     name = getattr(solver, "__name__", "") or "solver"
     offered = PythonSolver(functions if solver is None else solver, name, declared)
-    contestant = FunctionContestant(offered.functions, decode_greeting(offered.greeting))
+    connection = FunctionConnection(offered.functions, decode_greeting(offered.greeting))
     groups = {
-        (task, method): DISCIPLINES[task].cases(contestant.greeting, method, seed, thorough)
-        for task, method in trials(contestant.greeting)
+        (task, method): DISCIPLINES[task].cases(connection.greeting, method, seed, thorough)
+        for task, method in trials(connection.greeting)
     }
 
     @cache
     def report(task: str, method: str) -> TaskReport:
-        return judge_cases(contestant, task, method, groups[task, method])
+        return judge_cases(connection, task, method, groups[task, method])
 
     @pytest.mark.parametrize(("task", "method", "case"), [
         pytest.param(task, method, case.name, id=" ".join(filter(None, (task, method, case.name))))

@@ -19,8 +19,8 @@ from plumbob.reference.skeleton import Pose
 from plumbob.text.sentence import codes_in, sentence
 
 from .case import Case
-from .fault_programs import PROGRAMS, CodedFault, coded_faults, contestant_of, source_of
-from .functions import FunctionContestant
+from .fault_programs import PROGRAMS, CodedFault, coded_faults, connection_to, source_of
+from .functions import FunctionConnection
 from .greeting import PROTOCOL, Greeting, Method, Precision, Step, System
 from .judgement import Report, Verdict
 from .kinematics.honest import HONEST as HONEST_SWEEPS
@@ -92,16 +92,16 @@ class Trial(NamedTuple):
 
 def attempt(subject: Subject) -> Trial:
     """Judge a subject as `verify` judges any solver."""
-    contestant = FunctionContestant({subject.task: subject.function}, subject.greeting)
+    connection = FunctionConnection({subject.task: subject.function}, subject.greeting)
     published: list[Report] = []
-    report = verify(contestant, publish=published.append).tasks[0]
+    report = verify(connection, publish=published.append).tasks[0]
     laws = frozenset(
         finding.law
         for judgement in report.judgements
         for finding in judgement.findings
         if finding.verdict >= Verdict.WRONG
     )
-    if report.assumptions and (report.is_asked or report.verdict is Verdict.RIGHT_EXCEPT):
+    if report.assumptions and (report.needs_declaration or report.verdict is Verdict.RIGHT_EXCEPT):
         laws |= {"takes what is sent"}
     explanations = report.diagnosis.explanations
     keys = explanations[0].faults if explanations else ()
@@ -166,7 +166,7 @@ def _robots() -> Iterator[Subject]:
         programs = [fault for fault in faults if fault.name not in BY_LINES]
         for fault in programs:
             function = _function(task, fault.wrong_program)
-            greeting = contestant_of(fault.wrong_program).greeting
+            greeting = connection_to(fault.wrong_program).greeting
             yield Subject(fault.name, "robots", task, function, greeting, fault.name)
         right = {f"program, {task}": _function(task, programs[0].right_program)}
         yield from _subjects(HONEST, task, right)
@@ -243,7 +243,7 @@ def _mass_spring_faults() -> Iterator[Subject]:
     for fault in coded_faults().values():
         if fault.task in MASS_SPRING:
             function = _function(fault.task, fault.wrong_program)
-            greeting = contestant_of(fault.wrong_program).greeting
+            greeting = connection_to(fault.wrong_program).greeting
             family = MASS_SPRING[fault.task]
             yield Subject(fault.name, family, fault.task, function, greeting, fault.name)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TypeVar
 
-from .contestant import Answer, Failure
+from .exchange import Answer, Failure
 
 Returned = TypeVar("Returned")
 # Calls of the reference: the first may compile; the others are as many as each case is asked.

@@ -11,9 +11,9 @@ from plumbob.text.sentence import Sentence, codes_in, sentence
 from . import inference, kept_state, precision, zeros
 from .case import Case
 from .cause_search import SECONDS, CauseSearch, JudgedAnswers
-from .contestant import Contestant, Exchange, Failure, NoGreetingError, is_hung
 from .disciplines import DISCIPLINES
 from .examination import Examiner
+from .exchange import Connection, Exchange, Failure, NoGreetingError, is_hung
 from .greeting import Greeting
 from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
 from .kinematics import inverse_kinematics
@@ -40,7 +40,7 @@ EXAMINERS: Sequence[Examiner] = (
 
 
 def verify(
-    contestant: Contestant,
+    connection: Connection,
     tasks: Sequence[str] | None = None,
     seed: int = 0,
     thorough: bool = False,
@@ -56,11 +56,11 @@ def verify(
     Raises:
         ValueError: if a task is not offered.
     """
-    greeting, remarks = _with_methods(contestant, tasks, seed)
+    greeting, remarks = _with_methods(connection, tasks, seed)
     attempts, reports, unjudged = list[Attempt](), list[TaskReport](), list[str]()
     pairs = trials(greeting, tasks)
     for task, method in pairs:
-        attempt = Attempt(contestant, task, method, seed, thorough, notify)
+        attempt = Attempt(connection, task, method, seed, thorough, notify)
         try:
             reports.append(attempt.examine())
             attempts.append(attempt)
@@ -69,7 +69,7 @@ def verify(
         except Exception as error:
             unjudged.append(task)
             remarks += (sentence("{task}: {why}", task=task, why=failed(error)),)
-        report = Report(contestant.greeting, tuple(reports), seed, remarks, tuple(unjudged))
+        report = Report(connection.greeting, tuple(reports), seed, remarks, tuple(unjudged))
         publish(replace(report, remarks=(*remarks, _unfinished(len(reports), len(pairs)))))
     explained, is_interrupted = list[TaskReport](), False
     for attempt, verdict in zip(attempts, reports, strict=True):
@@ -79,7 +79,7 @@ def verify(
         explanation = attempt.explain(verdict, explained, cause_search)
         explained.append(_with_observations(explanation, observed))
         is_interrupted = cause_search.is_interrupted
-    return Report(contestant.greeting, explained, seed, remarks, tuple(unjudged))
+    return Report(connection.greeting, explained, seed, remarks, tuple(unjudged))
 
 
 def failed(error: Exception) -> Sentence:
@@ -105,14 +105,14 @@ class Attempt:
 
     def __init__(
         self,
-        contestant: Contestant,
+        connection: Connection,
         task: str,
         method: str,
         seed: int,
         thorough: bool,
         notify: Notify,
     ) -> None:
-        self.task, self.contestant, self._method = task, contestant, method
+        self.task, self.connection, self._method = task, connection, method
         self._seed, self._thorough, self._notify = seed, thorough, notify
         self._answers: dict[str, Sequence[Exchange]] = {}  # by the greeting that the cases suit
         self._unsent: Sentence | None = None
@@ -122,12 +122,12 @@ class Attempt:
         key = repr(greeting)
         if key not in self._answers:
             cases = DISCIPLINES[self.task].cases(greeting, self._method, self._seed, self._thorough)
-            self._answers[key] = self.ask(cases)
+            self._answers[key] = self.exchange(cases)
         return self._answers[key]
 
-    def ask(self, cases: Sequence[Case]) -> Sequence[Exchange]:
+    def exchange(self, cases: Sequence[Case]) -> Sequence[Exchange]:
         """Return the answers to some cases."""
-        exchanges = _ask(self.contestant, cases, self._notify)
+        exchanges = _ask(self.connection, cases, self._notify)
         if unsent := len(cases) - len(exchanges):
             self._unsent = _unsent(unsent, len(cases))
         return exchanges
@@ -144,7 +144,7 @@ class Attempt:
 
     def examine(self, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
         """Return the report with the verdict, by laws, honest programs and examiners alone."""
-        report = self.judge(self.contestant.greeting, exchanges)
+        report = self.judge(self.connection.greeting, exchanges)
         for examiner in EXAMINERS if exchanges is None else (precision.examine,):
             report = examiner(self, report)
         return report
@@ -154,7 +154,7 @@ class Attempt:
 
         def observe_in_time() -> tuple[Sentence, ...]:
             with search.limited():
-                return observations.observe(self.contestant, verdict, self._seed)
+                return observations.observe(self.connection, verdict, self._seed)
 
         silence: tuple[Sentence, ...] = ()
         observed = search.run(observe_in_time, silence)
@@ -196,20 +196,20 @@ class Attempt:
         diagnose = partial(self._diagnosis, search, is_placed)
         report = search.run(lambda: _with_diagnosis(verdict, diagnose), verdict)
         if not causes and report.greeting is not None:
-            find_line = partial(with_changed_line, report, report.greeting, self.contestant)
+            find_line = partial(with_changed_line, report, report.greeting, self.connection)
             report = search.run(find_line, report)
             original = report.original
             if original is not None and not report.diagnosis.explained:
-                greeting = self.contestant.greeting
+                greeting = self.connection.greeting
                 find_line = partial(
-                    with_changed_line, original, greeting, self.contestant, known_alone=True
+                    with_changed_line, original, greeting, self.connection, known_alone=True
                 )
                 report = _unless_meant(report, search.run(find_line, original))
         return _with_cause(report, causes)
 
     def _diagnosis(self, search: CauseSearch, is_placed: bool, report: TaskReport) -> Diagnosis:
         """Return the diagnosis before lines are changed."""
-        greeting = report.greeting or self.contestant.greeting
+        greeting = report.greeting or self.connection.greeting
         answers = JudgedAnswers(report, greeting, search, is_placed)
         return DISCIPLINES[self.task].diagnose(answers)
 
@@ -303,15 +303,15 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
 
 
 def _with_methods(
-    contestant: Contestant, tasks: Sequence[str] | None, seed: int
+    connection: Connection, tasks: Sequence[str] | None, seed: int
 ) -> tuple[Greeting, tuple[Sentence, ...]]:
     """Return the greeting with the methods that answers show, and remarks on them."""
-    greeting = contestant.greeting
+    greeting = connection.greeting
     task = next((task for task in WITH_METHODS if task in (tasks or greeting.tasks)), None)
     if task is None or task not in greeting.tasks:
         return greeting, ()
     methods = inference.methods_of(
-        contestant, DISCIPLINES[task].cases(greeting, "", seed, False)[2:3]
+        connection, DISCIPLINES[task].cases(greeting, "", seed, False)[2:3]
     )
     if methods == greeting.methods:
         return greeting, ()
@@ -323,7 +323,7 @@ def _with_methods(
 
 
 def judge_cases(
-    contestant: Contestant,
+    connection: Connection,
     task: str,
     method: str,
     cases: Sequence[Case],
@@ -333,8 +333,8 @@ def judge_cases(
 
     The arguments are those of `verify`.
     """
-    attempt = Attempt(contestant, task, method, 0, False, notify)
-    verdict = attempt.examine(attempt.ask(cases))
+    attempt = Attempt(connection, task, method, 0, False, notify)
+    verdict = attempt.examine(attempt.exchange(cases))
     return attempt.explain(verdict, (), CauseSearch())
 
 
@@ -365,7 +365,7 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
     ]
 
 
-def _ask(contestant: Contestant, cases: Sequence[Case], notify: Notify) -> list[Exchange]:
+def _ask(connection: Connection, cases: Sequence[Case], notify: Notify) -> list[Exchange]:
     """Ask each case, then each answered case a second time.
 
     Forces and energies are asked again in reverse, so that remains of the last request show.
@@ -373,7 +373,7 @@ def _ask(contestant: Contestant, cases: Sequence[Case], notify: Notify) -> list[
     answers, hangs, work = [], 0, sentence("asking {task}", task=cases[0].task if cases else "")
     for i, case in enumerate(cases):
         notify(work, i, 2 * len(cases))
-        answers.append(contestant.answer(case))
+        answers.append(connection.answer(case))
         hangs += is_hung(answers[-1])
         if hangs == MAX_HANGS:
             break
@@ -382,7 +382,7 @@ def _ask(contestant: Contestant, cases: Sequence[Case], notify: Notify) -> list[
     for i, (case, answer) in enumerate(requests[::order]):
         notify(work, len(cases) + i, 2 * len(cases))
         is_last = isinstance(answer, Failure) or hangs >= 2 * MAX_HANGS
-        repeat = answer if is_last else contestant.answer(case)
+        repeat = answer if is_last else connection.answer(case)
         hangs += not is_last and is_hung(repeat)
         exchanges.append(Exchange(case, with_lesser_time(answer, repeat), repeat))
     return exchanges[::order]

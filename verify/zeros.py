@@ -8,8 +8,8 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 
-from .contestant import Answer, Contestant, is_hung
 from .examination import Examination
+from .exchange import Answer, Connection, is_hung
 from .gaps import largest_gap
 from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
@@ -30,7 +30,7 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         return report
     for name in NAMES:
         concerned = [j for j in wrong if _has_zeros(j, name)]
-        if not concerned or not _jumps(examination.contestant, concerned, name):
+        if not concerned or not _jumps(examination.connection, concerned, name):
             continue
         words = sentence(
             "Where {name} are 0 its answers are not those of almost 0: it takes 0 for a missing "
@@ -58,13 +58,13 @@ def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
     return values is not None and np.size(values) > 0 and not np.all(values)
 
 
-def _jumps(contestant: Contestant, judgements: Sequence[CaseJudgement], name: str) -> bool:
+def _jumps(connection: Connection, judgements: Sequence[CaseJudgement], name: str) -> bool:
     """Return whether answers with zeros differ from those with almost zeros, wherever it tells."""
     count = 0
     for judgement in judgements:
         values = np.asarray(judgement.case.inputs[name])
         zero, almost, other = (
-            _outputs(contestant, judgement, {name: np.where(values == 0.0, number, values)})
+            _outputs(connection, judgement, {name: np.where(values == 0.0, number, values)})
             for number in (0.0, ALMOST, 1.0)
         )
         jump, change = _gap(almost, zero), _gap(almost, other)
@@ -79,10 +79,10 @@ def _jumps(contestant: Contestant, judgements: Sequence[CaseJudgement], name: st
 
 
 def _outputs(
-    contestant: Contestant, judgement: CaseJudgement, change: Mapping[str, Any]
+    connection: Connection, judgement: CaseJudgement, change: Mapping[str, Any]
 ) -> Mapping[str, Any]:
     case = replace(judgement.case, inputs={**judgement.case.inputs, **change})
-    answer = contestant.answer(case)
+    answer = connection.answer(case)
     return answer.values if isinstance(answer, Answer) else {}
 
 

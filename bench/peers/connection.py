@@ -5,8 +5,8 @@ from typing import Any
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Failure
-from plumbob.verify.door import ProcessLimits, open_contestant
+from plumbob.verify.connections import ProcessLimits, open_connection
+from plumbob.verify.exchange import Failure
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.message import NO_SECONDS
 
@@ -28,7 +28,7 @@ class SolverConnection:
     """
 
     def __init__(self, spec: Spec) -> None:
-        self._solver, self.remark = open_contestant(spec, LIMITS), ""
+        self._solver, self.remark = open_connection(spec, LIMITS), ""
 
     @property
     def greeting(self) -> Greeting:

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from plumbob.text.printable import one_line
-from plumbob.verify.contestant import NoGreetingError
-from plumbob.verify.door import LIMITS, open_contestant
+from plumbob.verify.connections import LIMITS, open_connection
+from plumbob.verify.exchange import NoGreetingError
 from plumbob.verify.greeting import Greeting
 
 from ..problems.own import clean
@@ -109,7 +109,7 @@ def open_installed(
 
 
 def _open(address: SolverAddress) -> UserSolver:
-    solver = open_contestant(address.spec, LIMITS)
+    solver = open_connection(address.spec, LIMITS)
     try:
         greeting = solver.greeting
     except NoGreetingError as error:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-# What `open_contestant` takes: a Python file or object, or a command.
+# What `open_connection` takes: a Python file or object, or a command.
 Spec = str | tuple[str, ...]
 
 CHAIN_TASK, ROBOT_TASK = "inverse_kinematics", "robot_inverse_kinematics"

@@ -10,8 +10,8 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.printable import one_line
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Contestant, Failure, NoGreetingError
-from plumbob.verify.door import open_contestant
+from plumbob.verify.connections import open_connection
+from plumbob.verify.exchange import Connection, Failure, NoGreetingError
 
 TRACK, REACH = "track", "inverse_kinematics"
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"
@@ -33,7 +33,7 @@ class SceneSolver:
         tasks: as offered.
     """
 
-    def __init__(self, address: str, solver: Contestant) -> None:
+    def __init__(self, address: str, solver: Connection) -> None:
         """Ask a solver for its name and tasks.
 
         Raises:
@@ -56,7 +56,7 @@ class SceneSolver:
         Raises:
             ValueError: if there is no solver, or it does not describe itself.
         """
-        return cls(" ".join(words), open_contestant(words[0] if len(words) == 1 else words))
+        return cls(" ".join(words), open_connection(words[0] if len(words) == 1 else words))
 
     def close(self) -> None:
         """End the solver and its processes."""

@@ -15,8 +15,8 @@ from .options import FAILED, SUCCESS, File, Text, Texts, argument, flag, option
 
 if TYPE_CHECKING:
     from plumbob.text.sentence import Say, Sentence
-    from plumbob.verify.door import ProcessLimits
-    from plumbob.verify.door.question import Question
+    from plumbob.verify.connections import ProcessLimits
+    from plumbob.verify.connections.command import CaseOptions
     from plumbob.verify.judgement import Report
     from plumbob.verify.screen.files import Files
     from plumbob.verify.screen.words import Presentation
@@ -101,28 +101,28 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
         bar.add_task("starting", total=None)
         from plumbob.text.language import language_of
-        from plumbob.verify.door.question import ANSWERS, Question, limits
+        from plumbob.verify.connections.command import ANSWERS, CaseOptions, limits
         from plumbob.verify.screen.files import Files
         from plumbob.verify.screen.words import Presentation, speaker
 
         language = language_of(lang)
-        question = Question(tuple(task or ()), rerun, thorough, seed)
+        options = CaseOptions(tuple(task or ()), rerun, thorough, seed)
         if names or template or export:
             work.close()
-            return _print(_listed(question, names, template, export, speaker(language)))
+            return _print(_listed(options, names, template, export, speaker(language)))
         folder = [ANSWERS, str(answers)] if answers else []
         words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
         if self_test:
             work.close()
-            return _self_test([*words, *question.tasks], speaker(language))
+            return _self_test([*words, *options.tasks], speaker(language))
         files = Files(json, junit, html, output)
         presentation = Presentation(speaker(language), language, words)
-        finish = _judge(presentation, limits(time_limit, memory_limit), question, files, bar)
+        finish = _judge(presentation, limits(time_limit, memory_limit), options, files, bar)
     return finish()
 
 
 def _listed(
-    question: "Question", names: bool, template: str | None, export: Path | None, say: "Say"
+    options: "CaseOptions", names: bool, template: str | None, export: Path | None, say: "Say"
 ) -> Iterable[str]:
     """Return lines on the tasks, or on the starter or cases to write."""
     from plumbob.verify.screen import listings
@@ -130,22 +130,22 @@ def _listed(
     if template and not names:
         return listings.starter(template, Path(), say)
     if export and not names:
-        return listings.exported(export, question.tasks, question.seed, question.thorough, say)
-    return listings.described(question.tasks, say)
+        return listings.exported(export, options.tasks, options.seed, options.thorough, say)
+    return listings.described(options.tasks, say)
 
 
 def _judge(
     context: "Presentation",
     limits: "ProcessLimits",
-    question: "Question",
+    options: "CaseOptions",
     files: "Files",
     bar: Any,
 ) -> Callable[[], int]:
     """Judge a solver; return what prints the verdict, writes the files and gives the exit code."""
     from plumbob.process.paths import check_regular
     from plumbob.text.sentence import sentence
-    from plumbob.verify.contestant import NoGreetingError
-    from plumbob.verify.door.question import ask, opened, suited
+    from plumbob.verify.connections.command import judge, open_named, options_of_answers
+    from plumbob.verify.exchange import NoGreetingError
     from plumbob.verify.screen.files import UNJUDGED
     from plumbob.verify.verify import failed
 
@@ -155,12 +155,12 @@ def _judge(
     for path in filter(None, files.paths()):
         check_regular(path)
         writable(path.parent)
-    user_solver = opened(list(context.solver), limits, say)
-    question = suited(question, user_solver)
-    notify, publish = _notifier(bar, say), _publisher(bar, files, question, context)
+    user_solver = open_named(list(context.solver), limits, say)
+    options = options_of_answers(options, user_solver)
+    notify, publish = _notifier(bar, say), _publisher(bar, files, options, context)
     try:
         notify(sentence("starting the solver"), 0, None)
-        report = ask(user_solver, question, notify, publish)
+        report = judge(user_solver, options, notify, publish)
     except NoGreetingError as error:
         raise ValueError(say(sentence(
             "solver: it did not start, or did not answer the greeting (the first request). {why}",
@@ -171,7 +171,7 @@ def _judge(
     except Exception as error:
         print("plumbob:", say(failed(error)), file=sys.stderr)
         return lambda: UNJUDGED
-    return partial(files.write, report, question, context)
+    return partial(files.write, report, options, context)
 
 
 def _notifier(bar: Any, say: "Say") -> "Notify":
@@ -189,7 +189,7 @@ def _notifier(bar: Any, say: "Say") -> "Notify":
 
 
 def _publisher(
-    bar: Any, files: "Files", question: "Question", context: "Presentation"
+    bar: Any, files: "Files", options: "CaseOptions", context: "Presentation"
 ) -> Callable[["Report"], None]:
     """Return what prints the newest verdict and writes the files, before any cause is sought."""
     from plumbob.verify.screen.words import verdict_line
@@ -198,7 +198,7 @@ def _publisher(
         if report.tasks:
             line = context.say(verdict_line(report.tasks[-1]))
             bar.console.print(line, highlight=False, markup=False, soft_wrap=True)
-        files.save(report, question, context)
+        files.save(report, options, context)
 
     return publish
 

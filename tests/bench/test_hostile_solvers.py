@@ -1,7 +1,7 @@
 """What a hostile Python file gets from `verify` and from the bench; nothing of it stays.
 
 Elsewhere: programs (`test_hostile_programs`), answers that are none (`test_message`), files of
-answers (`test_doors_files`), and what a Python file does by mistake (`test_doors_python`).
+answers (`test_connections_files`), and mistakes of Python files (`test_connections_python`).
 """
 
 import json
@@ -27,8 +27,8 @@ from plumbob.bench.problems.chains import TargetsForSkeleton
 from plumbob.reference import Skeleton
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer
-from plumbob.verify.door import open_contestant
+from plumbob.verify.connections import open_connection
+from plumbob.verify.exchange import Answer
 
 TASK = "inverse_kinematics"
 TARGETS = np.array([[0.0, 2.0, 1.0], [0.0, 1.0, 2.0]])
@@ -108,7 +108,7 @@ def test_a_hostile_python_file_gets_its_sentence(tmp_path, name):
     row = BEHAVIOURS[name]
     (tmp_path / "solver.py").write_text(source(row.does, PYTHON))
     patience = 0.5 if row.python.startswith("^hung") else 20.0
-    solver = open_contestant(str(tmp_path / "solver.py"), LIMITS._replace(request=patience))
+    solver = open_connection(str(tmp_path / "solver.py"), LIMITS._replace(request=patience))
     try:
         before, answer, after = (solver.answer(case(n)) for n in (RIGHT, HOSTILE, RIGHT))
     finally:

@@ -25,7 +25,7 @@ from plumbob.bench.tables.results import Results, printable
 from plumbob.cli.main import run_command
 from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
-from plumbob.verify.door import open_contestant
+from plumbob.verify.connections import open_connection
 
 PAGE = Path(__file__).parents[2] / "docs" / "bench.md"
 IK, CLOTH, ROBOT, PROBLEMS = re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.DOTALL)
@@ -327,10 +327,10 @@ def test_the_link_of_the_tool_is_where_poses_are_evaluated(name):
 
 
 def test_a_solver_is_closed_after_its_greeting(folder, monkeypatch):
-    closed, solver = [], open_contestant(str(folder / "my_ik.py"))
+    closed, solver = [], open_connection(str(folder / "my_ik.py"))
     close = solver.close
     monkeypatch.setattr(solver, "close", lambda: closed.append(close()))
-    monkeypatch.setattr(opening, "open_contestant", lambda *_: solver)
+    monkeypatch.setattr(opening, "open_connection", lambda *_: solver)
     entrants("my_ik.py")
     assert closed == [None]
 

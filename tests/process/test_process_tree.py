@@ -120,10 +120,10 @@ def test_what_runs_is_seen(tmp_path, monkeypatch, columns):
     """Otherwise no test would see what is left running."""
     if columns:
         monkeypatch.setenv("COLUMNS", columns)
-    contestant = program(tmp_path, "pass")
-    contestant.answer(case(2))
+    connection = program(tmp_path, "pass")
+    connection.answer(case(2))
     assert len(running(tmp_path, 0.0)) == 1
-    contestant.close()
+    connection.close()
     assert not running(tmp_path)
 
 
@@ -136,21 +136,21 @@ def test_a_judge_that_is_killed_takes_the_program_with_it(tmp_path, end):
     judge = (
         "import os, sys; sys.path[:0] = sys.argv[1:3]\n"
         "from hostile_programs import LIMITS, case, program\n"
-        "from plumbob.verify.door.program import ProgramContestant\n"
-        "contestant = ProgramContestant([sys.executable, '-I', '-S', sys.argv[3]], limits=LIMITS)\n"
-        "contestant.answer(case(2))\n"
-        'contestant._ready().send(b\'{"id": 2, "parents": [1, 2, 3]}\\n\')\n'
-        f"contestant._ready()._exchange(0.1)\n{end}\n"
+        "from plumbob.verify.connections.program import ProgramConnection\n"
+        "connection = ProgramConnection([sys.executable, '-I', '-S', sys.argv[3]], limits=LIMITS)\n"
+        "connection.answer(case(2))\n"
+        'connection._ready().send(b\'{"id": 2, "parents": [1, 2, 3]}\\n\')\n'
+        f"connection._ready()._exchange(0.1)\n{end}\n"
     )
-    command = [sys.executable, "-c", judge, ROOT, f"{ROOT}/tests", str(tmp_path / "contestant.py")]
+    command = [sys.executable, "-c", judge, ROOT, f"{ROOT}/tests", str(tmp_path / "connection.py")]
     assert subprocess.run(command, check=False).returncode in (0, -9, -15)
     assert not running(tmp_path)
 
 
-def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
-    contestant = program(tmp_path, "pass")
-    contestant.answer(case(2))
-    pid, marker = contestant._process.pid, contestant._process._marker
+def test_each_program_has_one_guard_and_it_leaves(tmp_path):
+    connection = program(tmp_path, "pass")
+    connection.answer(case(2))
+    pid, marker = connection._process.pid, connection._process._marker
 
     def guards():
         listed = subprocess.run(["ps", "-A", "-ww", "-o", "args="], capture_output=True, check=True)
@@ -158,7 +158,7 @@ def test_each_contestant_has_one_guard_and_it_leaves(tmp_path):
         return sum("read line ||" in line and line.endswith(f" {pid} {marker}") for line in lines)
 
     assert guards() == 1
-    contestant.close()
+    connection.close()
     assert guards() == 0
 
 

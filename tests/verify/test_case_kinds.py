@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from plumbob.verify.fault_programs import source_of
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.mass_spring import energy
@@ -31,8 +31,8 @@ def all_cases(task):
 
 
 def judged(task, function, cases, **declared):
-    contestant = FunctionContestant({task: function}, Greeting(1, (task,), **declared))
-    return judge_cases(contestant, task, "", cases)
+    connection = FunctionConnection({task: function}, Greeting(1, (task,), **declared))
+    return judge_cases(connection, task, "", cases)
 
 
 def wrong_cases(report):
@@ -219,14 +219,14 @@ RESAMPLE = "resample"
 )
 def test_a_resampler_that_takes_spacing_alone_is_right_but_for_that(function, words):
     cases = all_cases(RESAMPLE)
-    contestant = FunctionContestant({RESAMPLE: function}, Greeting(1, (RESAMPLE,)))
-    (report,) = verify(contestant).tasks
+    connection = FunctionConnection({RESAMPLE: function}, Greeting(1, (RESAMPLE,)))
+    (report,) = verify(connection).tasks
     assert report.verdict is Verdict.RIGHT_EXCEPT
     assert len(report.judgements) == len(cases) // 2
     assert words in str(report.assumptions[0])
     assert '"resample_by": "spacing"' in str(report.assumptions[1])
     declared = Greeting(1, (RESAMPLE,), resample_by="spacing")
-    assert verify(FunctionContestant({RESAMPLE: function}, declared)).verdict is Verdict.RIGHT
+    assert verify(FunctionConnection({RESAMPLE: function}, declared)).verdict is Verdict.RIGHT
 
 
 def test_a_wrong_count_is_not_taken_for_a_missing_one():
@@ -234,5 +234,5 @@ def test_a_wrong_count_is_not_taken_for_a_missing_one():
         length = np.sqrt(np.square(np.diff(curve, axis=0)).sum(axis=1)).sum()
         return by_spacing(curve, closed, spacing or length / count)
 
-    contestant = FunctionContestant({RESAMPLE: function}, Greeting(1, (RESAMPLE,)))
-    assert verify(contestant).verdict is Verdict.WRONG
+    connection = FunctionConnection({RESAMPLE: function}, Greeting(1, (RESAMPLE,)))
+    assert verify(connection).verdict is Verdict.WRONG

@@ -9,9 +9,9 @@ import pytest
 from plumbob.process.tree import main_thread_seconds
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer
-from plumbob.verify.door import ProcessLimits, open_contestant
-from plumbob.verify.door.claimed_time import contradicts
+from plumbob.verify.connections import ProcessLimits, open_connection
+from plumbob.verify.connections.claimed_time import contradicts
+from plumbob.verify.exchange import Answer
 
 LIMITS = ProcessLimits(first=60.0, request=60.0)
 # Seconds of 40 requests: what is computed for the messages, and what solves take; some are long.
@@ -94,14 +94,14 @@ def answers(spec, count=21):
         "local_rotations": np.eye(2, 4),
     }
     limits = {"effector": 1, "tolerance": 1e-4, "max_iterations": 9, "method": ""}
-    contestant = open_contestant(spec, LIMITS)
+    connection = open_connection(spec, LIMITS)
     found = []
     for i in range(count):
         inputs = joints | limits | {"target": np.array([10.0 if i % 10 else 1.0, 0.0, 0.0])}
-        found.append(contestant.answer(Case("1", "inverse_kinematics", inputs, "1", sentence("1"))))
-    contestant.close()
+        found.append(connection.answer(Case("1", "inverse_kinematics", inputs, "1", sentence("1"))))
+    connection.close()
     assert all(isinstance(one, Answer) for one in found), found[0]
-    return found, [str(one) for one in contestant.remarks]
+    return found, [str(one) for one in connection.remarks]
 
 
 def python(folder, text):

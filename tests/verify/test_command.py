@@ -16,7 +16,7 @@ from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
 from plumbob.verify import verify
 from plumbob.verify.case import Case
-from plumbob.verify.door import saved
+from plumbob.verify.connections import saved
 
 RIGHT = """
 import numpy as np

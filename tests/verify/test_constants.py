@@ -7,7 +7,7 @@ import pytest
 
 from plumbob.reference import Skeleton, solve_ik
 from plumbob.reference.rotation import between, conjugate, multiply, rotate
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Fixed, Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import inverse_kinematics
@@ -24,7 +24,7 @@ DOWN = [0.0, -9.8, 0.0]
 
 
 def judged(task, function, **declared):
-    (report,) = verify(FunctionContestant({task: function}, Greeting(1, (task,), **declared))).tasks
+    (report,) = verify(FunctionConnection({task: function}, Greeting(1, (task,), **declared))).tasks
     return report
 
 

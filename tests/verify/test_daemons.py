@@ -11,8 +11,8 @@ import pytest
 from hostile_programs import case, program, running
 
 from plumbob.process import tree as process_tree
-from plumbob.verify.contestant import Answer
-from plumbob.verify.door import open_contestant
+from plumbob.verify.connections import open_connection
+from plumbob.verify.exchange import Answer
 
 ROOT = Path(__file__).parents[2]
 LINUX_ONLY = pytest.mark.skipif(process_tree.LIMIT is None, reason="Linux has this limit only")
@@ -47,15 +47,15 @@ def daemon(folder):
 )
 def test_a_daemon_of_a_program_is_ended_and_remarked(tmp_path, then, words, remarks):
     loop = f"{daemon(tmp_path)}\nstart_daemon()\ngreet()\n{then}"
-    contestant = program(tmp_path, "pass", loop=loop)
-    assert contestant.greeting
+    connection = program(tmp_path, "pass", loop=loop)
+    assert connection.greeting
     deadline = time.monotonic() + 20.0
     while not any("/daemon " in line for line in running(tmp_path, 0.0)):
         assert time.monotonic() < deadline
-    answer = contestant.answer(case(2))
+    answer = connection.answer(case(2))
     assert words is None or words in str(answer.sentence)
-    contestant.close()
-    assert [str(remark) for remark in contestant.remarks] == remarks
+    connection.close()
+    assert [str(remark) for remark in connection.remarks] == remarks
     assert not running(tmp_path)
 
 
@@ -67,8 +67,8 @@ def test_the_memory_of_a_daemon_counts(tmp_path):
         "    if os.fork(): os._exit(0)\n    held = b'x' * (300 << 20)\n"
         "    while True: tick()\nos.wait()\ngreet()\nwhile True: tick()"
     )
-    contestant = program(tmp_path, "pass", loop=loop)
-    assert "took more than 0.262 GB of memory" in str(contestant.answer(case(2)).sentence)
+    connection = program(tmp_path, "pass", loop=loop)
+    assert "took more than 0.262 GB of memory" in str(connection.answer(case(2)).sentence)
     assert not running(tmp_path)
 
 
@@ -129,10 +129,10 @@ def test_what_the_caller_started_is_left_alone(tmp_path):
     thread.start()
     try:
         for _ in range(2):
-            contestant = open_contestant(tmp_path / "solver.py")
-            assert isinstance(contestant.answer(case(2)), Answer)
-            contestant.close()
-            assert contestant.remarks == ()
+            connection = open_connection(tmp_path / "solver.py")
+            assert isinstance(connection.answer(case(2)), Answer)
+            connection.close()
+            assert connection.remarks == ()
         stop.set()
         thread.join()
         start()

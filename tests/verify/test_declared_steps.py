@@ -5,9 +5,9 @@ import pytest
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.explain import Variant, explain
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.mass_spring.cases import task_cases
@@ -30,7 +30,7 @@ def judged(function, step, task=STEP):
     """Return the report on a function before a search among changed lines."""
     greeting = Greeting(1, (task,), step=step)
     cases = DISCIPLINES[task].cases(greeting, "", 0, False)
-    return judge_cases(FunctionContestant({task: function}, greeting), task, "", cases)
+    return judge_cases(FunctionConnection({task: function}, greeting), task, "", cases)
 
 
 def laws_with(report, verdict):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from kinematics_solvers import INVERSE, judged, reference
 
-from plumbob.verify.contestant import Failure
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Failure
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.laws import LAWS
@@ -153,8 +153,8 @@ def test_a_solver_that_never_answers_with_a_number_passes_no_case(solve, method)
     greeting = Greeting(1, (INVERSE,), methods=(method,))
     every = DISCIPLINES[INVERSE].cases(greeting, method, 0, False)
     cases = [case for case in every if case.requirement != "must"][:4] + every[:2]
-    contestant = FunctionContestant({INVERSE: solve}, greeting)
-    report = judge_cases(contestant, INVERSE, method, cases)
+    connection = FunctionConnection({INVERSE: solve}, greeting)
+    report = judge_cases(connection, INVERSE, method, cases)
     assert {judgement.verdict for judgement in report.judgements} == {BROKEN}
     assert passed(report) == f"0/{len(cases)}"
     assert all(judgement.complaints for judgement in report.judgements)

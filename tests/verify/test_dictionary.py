@@ -5,7 +5,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from plumbob.verify.contestant import Answer
 from plumbob.verify.dictionary import look_up as module
 from plumbob.verify.dictionary.build import digest
 from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, merged, read
@@ -22,14 +21,15 @@ from plumbob.verify.dictionary.requests import (
     requests,
     suitable,
 )
+from plumbob.verify.exchange import Answer
 from plumbob.verify.fault_programs import (
     IN_DICTIONARY,
     changes_of,
     coded_faults,
-    contestant_of,
+    connection_to,
     source_of,
 )
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting, System
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.one_line import search
@@ -87,7 +87,7 @@ def test_a_file_holds_what_was_written(tmp_path):
     np.testing.assert_allclose(dictionary.keys, written.keys, rtol=1e-7)
 
 
-class Solver(FunctionContestant):
+class Solver(FunctionConnection):
     """A solver that counts its starts and questions, with answers that may be rounded."""
 
     def __init__(self, source, kind=float, noise=0.0):
@@ -171,7 +171,7 @@ def ccd_proposals(source, **declared):
     names = {}
     exec(compile(source, "solver", "exec"), names)
     greeting = Greeting(PROTOCOL, (IK,), methods=("ccd",), **declared)
-    return look_up(FunctionContestant({IK: names["ccd"]}, greeting), IK, "ccd", greeting)
+    return look_up(FunctionConnection({IK: names["ccd"]}, greeting), IK, "ccd", greeting)
 
 
 def test_an_end_that_single_sweeps_do_not_show_is_proposed():
@@ -243,10 +243,10 @@ def test_two_mistakes_of_forces_are_named_together():
     codes = "PB-FORCE-005", "PB-FORCE-019"  # gravity upwards, and springs that push
     source = coded_faults()[codes[0]].wrong_program
     source = coded_faults()[codes[1]].planted_in(source)
-    contestant = contestant_of(source)
-    cases = DISCIPLINES[FORCES].cases(contestant.greeting, "", 0, False)
-    report = judge_cases(contestant, FORCES, "", cases)
-    report = with_changed_line(report, contestant.greeting, contestant)
+    connection = connection_to(source)
+    cases = DISCIPLINES[FORCES].cases(connection.greeting, "", 0, False)
+    report = judge_cases(connection, FORCES, "", cases)
+    report = with_changed_line(report, connection.greeting, connection)
     assert report.verdict is Verdict.WRONG
     assert {*report.diagnosis.explanations[0].codes} == {*codes}
 

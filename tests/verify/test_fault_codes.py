@@ -17,10 +17,10 @@ from plumbob.verify.fault_programs import (
     FAMILIES,
     PROGRAMS,
     coded_faults,
-    contestant_of,
+    connection_to,
     source_of,
 )
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.screen import json_file, junit, page, terminal
@@ -56,7 +56,7 @@ def test_no_code_has_a_larger_number_than_its_family_has_given():
 def report_of(*codes):
     task = "forward_kinematics"
     functions = {task: faulty(task, *codes)}
-    return verify(FunctionContestant(functions, Greeting(PROTOCOL, (task,))))
+    return verify(FunctionConnection(functions, Greeting(PROTOCOL, (task,))))
 
 
 @pytest.mark.parametrize("codes", [("PB-FK-001",), ("PB-FK-006", "PB-FK-013")])
@@ -85,7 +85,7 @@ def test_cases_are_folded_where_a_mistake_is_shown(codes, is_open):
 
 
 def reports(program, task):
-    (report,) = verify(contestant_of(program), [task]).tasks
+    (report,) = verify(connection_to(program), [task]).tasks
     return report
 
 
@@ -134,7 +134,7 @@ RESERVED = ("robot", "robot_track", "fabrik by angles")
 @pytest.mark.sample(every=40)
 @pytest.mark.parametrize("name", RIGHT_PROGRAMS)
 def test_a_right_program_is_right(name):
-    tasks = verify(contestant_of(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
+    tasks = verify(connection_to(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
     # A start without a solution of a robot, one iteration in each frame, a link of no length.
     expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
     assert {report.verdict for report in tasks} == {expected}

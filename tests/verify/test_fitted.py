@@ -5,7 +5,7 @@ from functools import cache
 import pytest
 
 from plumbob.text.sentence import sentence
-from plumbob.verify.fault_programs import contestant_of, source_of
+from plumbob.verify.fault_programs import connection_to, source_of
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from plumbob.verify.kinematics import problems
@@ -65,9 +65,9 @@ def planted(changes):
 
 def report_of(changes, count=None):
     """Return a report that calls all single sweeps of a changed program wrong."""
-    contestant = contestant_of(planted(changes))
+    connection = connection_to(planted(changes))
     found = (Finding("one sweep", Verdict.WRONG, 1.0, 0.0, "", sentence("")),)
-    answers = [(case, contestant.answer(case)) for case in sweeps()[:count]]
+    answers = [(case, connection.answer(case)) for case in sweeps()[:count]]
     judgements = [CaseJudgement(case, answer, found, {}) for case, answer in answers]
     return TaskReport(TASK, METHOD, judgements, Diagnosis())
 

@@ -6,7 +6,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.predictions import forward, path_to, solve
@@ -152,7 +152,7 @@ KINDS = {
 def judged(task, function, **declared):
     if task == STEP:
         declared = {"step": DECLARED["linearised"][1]} | declared
-    return verify(FunctionContestant({task: function}, Greeting(1, (task,), **declared)))
+    return verify(FunctionConnection({task: function}, Greeting(1, (task,), **declared)))
 
 
 def screen(report):
@@ -166,13 +166,13 @@ def screen(report):
 def test_an_undeclared_restriction_is_inferred_and_its_field_is_named(kind):
     task, function, fields = KINDS[kind]
     report = judged(task, function)
-    is_asked = bool({"stiffnesses", "rest_lengths", "pinned"} & fields.keys())
-    is_asked &= fields != {"rest_lengths": "measured"}
-    assert report.verdict is (Verdict.UNDECIDED if is_asked else Verdict.RIGHT_EXCEPT)
+    needs_declaration = bool({"stiffnesses", "rest_lengths", "pinned"} & fields.keys())
+    needs_declaration &= fields != {"rest_lengths": "measured"}
+    assert report.verdict is (Verdict.UNDECIDED if needs_declaration else Verdict.RIGHT_EXCEPT)
     assert report.tasks[0].assumptions
     text = screen(report)
-    assert ("if not, it is a mistake" in text) is is_asked
-    assert ("Next: declare what is meant in the greeting" in text) is is_asked
+    assert ("if not, it is a mistake" in text) is needs_declaration
+    assert ("Next: declare what is meant in the greeting" in text) is needs_declaration
     assert "eclare it with" in text
     assert all(f'"{name}": {json.dumps(value)}' in text for name, value in fields.items())
     known = [field.name for kind in (Greeting, System) for field in msgspec.structs.fields(kind)]

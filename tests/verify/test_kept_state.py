@@ -5,7 +5,7 @@ import pytest
 from kinematics_solvers import FORWARD, textbook
 
 from plumbob.verify import kept_state
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.verify import verify
@@ -13,7 +13,7 @@ from plumbob.verify.verify import verify
 RIGHT = textbook(FORWARD)
 
 
-class Program(FunctionContestant):
+class Program(FunctionConnection):
     """Functions whose memory ends with their process."""
 
     def __init__(self, function):

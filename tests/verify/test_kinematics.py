@@ -27,7 +27,7 @@ from kinematics_solvers import (
 
 from plumbob.reference import IK_SOLVERS, resample, rotation
 from plumbob.text.sentence import codes_in
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.greeting import Fixed, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import honest, problems, sweeps

@@ -5,8 +5,8 @@ from kinematics_solvers import FORWARD, INVERSE, METHODS, faulty
 
 from plumbob.text.sentence import Sentence, sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
     CaseJudgement,
@@ -23,7 +23,7 @@ def test_a_solver_that_stands_on_wrong_forward_kinematics_is_told_its_mistake(me
     code = "PB-FK-003"
     functions = {FORWARD: faulty(FORWARD, code), INVERSE: faulty(INVERSE, code, method=method)}
     greeting = Greeting(1, (FORWARD, INVERSE), methods=(method,))
-    forward, inverse = verify(FunctionContestant(functions, greeting)).tasks
+    forward, inverse = verify(FunctionConnection(functions, greeting)).tasks
     assert forward.diagnosis.explanations[0].codes == (code,)
     (hint, *_) = inverse.diagnosis.hints
     assert f"Its forward_kinematics is wrong as well ({code})" in str(hint)

@@ -10,7 +10,7 @@ from plumbob.reference import rotation
 from plumbob.reference.articulation import Articulation
 from plumbob.reference.skeleton import Skeleton
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import inverse_kinematics, limits, problems

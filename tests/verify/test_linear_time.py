@@ -17,7 +17,7 @@ SIZE = 1 << 20
 READERS = {
     "message": "from plumbob.verify.message import decode_object as read",
     "table": """
-from plumbob.verify.door.tables import read_table
+from plumbob.verify.connections.tables import read_table
 from plumbob.verify.task import TASKS
 read = lambda text: read_table(TASKS["resample"].outputs[0], {}, text)
 """,

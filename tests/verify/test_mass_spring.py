@@ -10,9 +10,9 @@ from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Failure, FailureKind
-from plumbob.verify.fault_programs import contestant_of, source_of
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer, Failure, FailureKind
+from plumbob.verify.fault_programs import connection_to, source_of
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step, System
 from plumbob.verify.judgement import CaseJudgement, Finding, Report, Verdict
 from plumbob.verify.mass_spring import energy, stepping
@@ -43,7 +43,7 @@ from plumbob.verify.verify import MAX_HANGS, verify
 def report(function, task="mass_spring_step", step=None, **greeting):
     """Return the report on a function."""
     hello = Greeting(1, (task,), step=step or Step(), **greeting)
-    return verify(FunctionContestant({task: function}, hello)).tasks[0]
+    return verify(FunctionConnection({task: function}, hello)).tasks[0]
 
 
 def named(report):
@@ -177,7 +177,7 @@ def test_of_a_step_that_gives_no_new_state_just_that_is_told(factor, words):
 
 
 def test_a_solver_that_hangs_is_asked_no_more_and_the_cases_left_out_are_told():
-    class Hung(FunctionContestant):
+    class Hung(FunctionConnection):
         def answer(self, case):
             asked.append(case)
             return Failure(FailureKind.HUNG, sentence("It computed."))
@@ -238,12 +238,12 @@ class GoesOn:
 
     def __init__(self, step, declared):
         hello = Greeting(1, ("mass_spring_step",), system=System(continues=True), step=declared)
-        self.door = FunctionContestant({"mass_spring_step": step}, hello)
+        self.connection = FunctionConnection({"mass_spring_step": step}, hello)
         self.greeting, self.last = hello, {}
 
     def answer(self, case):
         state = self.last if case.follows else {}
-        judged = self.door.answer(dataclasses.replace(case, inputs={**case.inputs, **state}))
+        judged = self.connection.answer(dataclasses.replace(case, inputs={**case.inputs, **state}))
         self.last = judged.values
         return judged
 
@@ -385,7 +385,7 @@ def test_conjugate_gradients_with_blocks_that_end_at_a_constant_are_named():
     source = source_of("change of velocity")
     wrong = source.replace(right, "conjugate_gradients(A[np.ix_(free, free)], b[free])")
     assert wrong != source
-    report = verify(contestant_of(wrong + GRADIENTS), ["mass_spring_step"]).tasks[0]
+    report = verify(connection_to(wrong + GRADIENTS), ["mass_spring_step"]).tasks[0]
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
     assert explanation.codes == ("PB-STEP-168",)

@@ -9,7 +9,7 @@ import pytest
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.greeting import Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.laws import equal_answers

@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as arrays
 from plumbob.text.printable import one_line
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.exchange import Answer, Failure, FailureKind
 from plumbob.verify.functions import understand
 from plumbob.verify.message import (
     decode_answer,

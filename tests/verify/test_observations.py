@@ -13,8 +13,8 @@ from observed_programs import PROGRAMS
 from plumbob.reference import rotation
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Failure, FailureKind
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer, Failure, FailureKind
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 from plumbob.verify.laws import finding
@@ -39,25 +39,25 @@ WRONG = finding("positions", verdict=Verdict.WRONG)
 WRONG_FINDING = (replace(WRONG, verdict=Verdict.WRONG),)
 
 
-def report_of(contestant, task, method, seed=0):
+def report_of(connection, task, method, seed=0):
     """Return the report in which every answer of a solver counts as wrong."""
     judgements = []
-    for case in DISCIPLINES[task].cases(contestant.greeting, method, seed, False):
+    for case in DISCIPLINES[task].cases(connection.greeting, method, seed, False):
         expected = inputs.right_answer(case, "") if task == FORWARD else {}
-        judgements.append(CaseJudgement(case, contestant.answer(case), WRONG_FINDING, expected))
+        judgements.append(CaseJudgement(case, connection.answer(case), WRONG_FINDING, expected))
     return TaskReport(task, method, judgements, Diagnosis())
 
 
-def contestant_of(function, task, method="", **greeting):
-    return FunctionContestant({task: function}, Greeting(1, (task,), methods=(method,), **greeting))
+def connection_to(function, task, method="", **greeting):
+    return FunctionConnection({task: function}, Greeting(1, (task,), methods=(method,), **greeting))
 
 
 def observed(function, task, method="", seed=0, **greeting):
     """Return what is said if every answer counts as wrong."""
-    contestant = contestant_of(function, task, method, **greeting)
+    connection = connection_to(function, task, method, **greeting)
     with np.errstate(all="ignore"):
-        report = report_of(contestant, task, method, seed)
-        return list(map(str, observations.observe(contestant, report, seed)))
+        report = report_of(connection, task, method, seed)
+        return list(map(str, observations.observe(connection, report, seed)))
 
 
 # What the six programs are told, as it was at the first run.
@@ -215,9 +215,9 @@ def test_what_springs_pull_in_a_linearised_step_is_solved_from_pairs():
 def test_requests_without_an_answer_are_left_out_and_a_crash_ends_them():
     def answered(kind):
         failures = iter([Failure(kind, sentence("It failed.")), *[Answer({}, 0.0)] * 9])
-        contestant = SimpleNamespace(answer=lambda case: next(failures))
+        connection = SimpleNamespace(answer=lambda case: next(failures))
         cases = [Case("", STEP, {}, "", sentence(""))] * 5
-        return len(observations._ask(contestant, cases, ""))
+        return len(observations._ask(connection, cases, ""))
 
     assert answered(FailureKind.RAISED) == 4
     assert answered(FailureKind.CRASHED) == 0
@@ -299,11 +299,11 @@ def test_equality_that_right_answers_have_is_said_without_the_rule(monkeypatch):
 
 
 def spring_judgements(function, change=lambda inputs: inputs):
-    contestant = contestant_of(function, STEP)
+    connection = connection_to(function, STEP)
     judgements = []
-    for case in DISCIPLINES[STEP].cases(contestant.greeting, "", 0, False):
+    for case in DISCIPLINES[STEP].cases(connection.greeting, "", 0, False):
         changed = replace(case, inputs={**case.inputs, **change(case.inputs)})
-        judgements.append(CaseJudgement(changed, contestant.answer(changed), WRONG_FINDING, {}))
+        judgements.append(CaseJudgement(changed, connection.answer(changed), WRONG_FINDING, {}))
     return judgements
 
 
@@ -335,8 +335,8 @@ def test_arc_sine_shows_where_angles_are_obtuse():
 
 
 def test_pins_and_rest_count_for_neither_side():
-    contestant = contestant_of(lambda **request: {"forces": 0.0 * request["positions"]}, FORCES)
-    judgements = report_of(contestant, FORCES, "").judgements
+    connection = connection_to(lambda **request: {"forces": 0.0 * request["positions"]}, FORCES)
+    judgements = report_of(connection, FORCES, "").judgements
     tables = springs.spring_evidence(judgements, 2.0**-52).tables
     pinned = {j.case.name for j in judgements if len(j.case.inputs.get("pinned", ())) == 2}
     counts = {j.case.name: len(j.case.inputs["masses"]) for j in judgements}
@@ -347,19 +347,19 @@ def test_pins_and_rest_count_for_neither_side():
 
 
 def test_joint_without_rotation_counts_for_neither_side():
-    contestant = contestant_of(textbook(FORWARD), FORWARD)
-    report = report_of(contestant, FORWARD, "")
+    connection = connection_to(textbook(FORWARD), FORWARD)
+    report = report_of(connection, FORWARD, "")
     table = joints.forward_evidence(report.judgements).tables["rotation"]
     assert not any(element.case == "arm at rest 1" for element in table.elements)
 
 
 def test_statements_on_one_sweep_need_max_iterations_to_be_read():
     program = next(p for p in PROGRAMS if p.__name__ == "ten_sweeps")
-    contestant = contestant_of(program, INVERSE, "ccd")
+    connection = connection_to(program, INVERSE, "ccd")
     with np.errstate(all="ignore"):
-        report = report_of(contestant, INVERSE, "ccd")
+        report = report_of(connection, INVERSE, "ccd")
         must = [j for j in report.judgements if j.case.requirement == "must"]
-        arguments = report, must, contestant.greeting
+        arguments = report, must, connection.greeting
         read, unread = (
             " ".join(map(str, observations.sentences(*arguments, names)))
             for names in ((), ("max_iterations",))
@@ -369,9 +369,9 @@ def test_statements_on_one_sweep_need_max_iterations_to_be_read():
 
 
 def test_inputs_count_only_if_right_answers_change(monkeypatch):
-    contestant = contestant_of(textbook(INVERSE), INVERSE, "ccd")
-    cases = DISCIPLINES[INVERSE].cases(contestant.greeting, "ccd", 0, False)
-    arguments = contestant, cases, contestant.greeting, "ccd"
+    connection = connection_to(textbook(INVERSE), INVERSE, "ccd")
+    cases = DISCIPLINES[INVERSE].cases(connection.greeting, "ccd", 0, False)
+    arguments = connection, cases, connection.greeting, "ccd"
     assert inputs.unread_inputs(*arguments) == []
     monkeypatch.setattr(inputs, "TIGHT", 0.0)
     monkeypatch.setattr(inputs, "SWEEPS", 1)
@@ -413,18 +413,18 @@ def _with_verdicts(report, verdict):
 
 def test_only_wrong_answers_to_enough_must_cases_are_observed():
     program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
-    contestant = contestant_of(program, FORWARD)
-    report = report_of(contestant, FORWARD, "")
-    assert observations.observe(contestant, report, 0)
+    connection = connection_to(program, FORWARD)
+    report = report_of(connection, FORWARD, "")
+    assert observations.observe(connection, report, 0)
     for verdict in (Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.UNDECIDED):
-        assert observations.observe(contestant, _with_verdicts(report, verdict), 0) == ()
+        assert observations.observe(connection, _with_verdicts(report, verdict), 0) == ()
     few = replace(report, judgements=report.judgements[-13:])
-    assert observations.observe(contestant, few, 0) == ()
+    assert observations.observe(connection, few, 0) == ()
     may = [
         replace(judgement, case=replace(judgement.case, requirement="may"))
         for judgement in report.judgements
     ]
-    assert observations.observe(contestant, replace(report, judgements=may), 0) == ()
+    assert observations.observe(connection, replace(report, judgements=may), 0) == ()
 
 
 # Beside the verdict and the search for causes
@@ -438,10 +438,10 @@ def test_requests_that_tell_more_are_not_counted():
         return PROGRAM(**request)
 
     PROGRAM = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
-    contestant = contestant_of(program, FORWARD)
-    report = report_of(contestant, FORWARD, "")
+    connection = connection_to(program, FORWARD)
+    report = report_of(connection, FORWARD, "")
     count = len(asked)
-    assert observations.observe(contestant, report, 0)
+    assert observations.observe(connection, report, 0)
     assert len(asked) > count
     assert len(report.judgements) == count
 
@@ -451,10 +451,10 @@ def test_error_of_the_observation_costs_no_verdict(monkeypatch):
         raise RuntimeError("no luck")
 
     program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
-    contestant = contestant_of(program, FORWARD)
-    with_words = verify(contestant).tasks[0]
+    connection = connection_to(program, FORWARD)
+    with_words = verify(connection).tasks[0]
     monkeypatch.setattr(observations, "observe", fails)
-    without = verify(contestant).tasks[0]
+    without = verify(connection).tasks[0]
     assert without.verdict is with_words.verdict is Verdict.WRONG
     assert "no luck" in str(without.diagnosis.observations[0])
     assert [e.faults for e in without.diagnosis.explanations] == [
@@ -469,7 +469,7 @@ def test_observations_stay_if_the_search_for_causes_fails(monkeypatch):
     program = next(p for p in PROGRAMS if p.__name__ == "leaves_not_rotated")
     module = sys.modules["plumbob.verify.verify"]
     monkeypatch.setattr(module.Attempt, "_explained", fails)
-    report = module.verify(contestant_of(program, FORWARD)).tasks[0]
+    report = module.verify(connection_to(program, FORWARD)).tasks[0]
     assert report.verdict is Verdict.WRONG
     assert "at leaves and nowhere else" in str(report.diagnosis.observations[0])
     assert "no cause" in str(report.diagnosis.hints[0])

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from plumbob.text.sentence import sentence
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.fault_programs import (
     FAMILIES,
     PROGRAMS,
     changes_of,
     coded_faults,
-    contestant_of,
+    connection_to,
     source_of,
 )
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
@@ -27,10 +27,10 @@ from plumbob.verify.verify import DISCIPLINES, judge_cases, trials, verify
 
 def report_on(source, task):
     """Judge a program by its task's laws, and name no mistakes by lines."""
-    contestant = contestant_of(source)
-    ((task, method),) = trials(contestant.greeting, [task])
-    cases = DISCIPLINES[task].cases(contestant.greeting, method, 0, False)
-    return judge_cases(contestant, task, method, cases), contestant.greeting
+    connection = connection_to(source)
+    ((task, method),) = trials(connection.greeting, [task])
+    cases = DISCIPLINES[task].cases(connection.greeting, method, 0, False)
+    return judge_cases(connection, task, method, cases), connection.greeting
 
 
 def changed_lines(source, task):
@@ -100,7 +100,7 @@ def test_neighbours_in_a_list_change_places():
 def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
     right, wrong = "length - rest_lengths[s]", "length - stiffnesses[s]"
     source = source_of("energy in loops").replace(right, wrong)
-    report = verify(contestant_of(source))
+    report = verify(connection_to(source))
     screen = " ".join(
         "\n".join(terminal.lines(report, Presentation(speaker("en"), "en", ["solver.py"]))).split()
     )
@@ -113,7 +113,7 @@ def test_the_line_is_printed_where_the_catalogue_knows_no_mistake():
 
 def test_a_mistake_of_the_catalogue_is_named_rather_than_a_line():
     fault = coded_faults()["PB-ENERGY-003"]
-    (report,) = verify(contestant_of(fault.wrong_program)).tasks
+    (report,) = verify(connection_to(fault.wrong_program)).tasks
     assert report.diagnosis.explanations[0].codes == (fault.code,)
 
 

@@ -8,8 +8,8 @@ from kinematics_solvers import faulty, textbook
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
     CaseJudgement,
@@ -86,16 +86,16 @@ def of_each_task(printers):
     return pytest.mark.parametrize(("task", "printer"), pairs)
 
 
-def contestant(task, function, rounded=np.asarray, **greeting):
+def connection(task, function, rounded=np.asarray, **greeting):
     def rounding(**inputs):
         answer = function(**inputs)
         return {n: rounded(value) if np.ndim(value) else value for n, value in answer.items()}
 
-    return FunctionContestant({task: rounding}, Greeting(1, (task,), **TASKS[task][2], **greeting))
+    return FunctionConnection({task: rounding}, Greeting(1, (task,), **TASKS[task][2], **greeting))
 
 
 def judged(*arguments, **greeting):
-    return verify(contestant(*arguments, **greeting)).tasks[0]
+    return verify(connection(*arguments, **greeting)).tasks[0]
 
 
 @pytest.mark.sample(every=8)
@@ -124,10 +124,10 @@ def test_a_wrong_solver_stays_wrong_and_its_fault_is_named(task, printer):
 @EACH_TASK
 def test_double_precision_is_believed_of_every_case_alone(task):
     """As --rerun asks them: some requests have short numbers, and answers as short."""
-    door = contestant(task, TASKS[task][0](None))
-    method = door.greeting.methods[0]
-    for case in DISCIPLINES[task].cases(door.greeting, method, 0, False):
-        assert not judge_cases(door, task, method, [case]).assumptions, case.name
+    program = connection(task, TASKS[task][0](None))
+    method = program.greeting.methods[0]
+    for case in DISCIPLINES[task].cases(program.greeting, method, 0, False):
+        assert not judge_cases(program, task, method, [case]).assumptions, case.name
 
 
 @pytest.mark.sample(without=["inverse"])
@@ -228,10 +228,10 @@ def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(lan
     def rounding(task, **inputs):
         return {name: as_float(value) for name, value in functions[task](**inputs).items()}
 
-    door = FunctionContestant(
+    program = FunctionConnection(
         {task: lambda task=task, **inputs: rounding(task, **inputs) for task in functions}, greeting
     )
-    report = verify(door)
+    report = verify(program)
     say = speaker(language)
     context = Presentation(say, language, ["my.py"])
     told = say(report.tasks[0].assumptions[0])
@@ -242,6 +242,6 @@ def test_the_precision_is_said_once_for_all_tasks_and_nothing_contradicts_it(lan
     assert json.loads(json_file.text(report, say))["remarks"] == [told]
     assert told.replace('"', "&#34;") in page.render(report, context)
     assert junit.text(report, say).count(told) == 2
-    one = Report(greeting, [report.tasks[0], verify(door, ["mass_spring_forces"]).tasks[0]], 0)
+    one = Report(greeting, [report.tasks[0], verify(program, ["mass_spring_forces"]).tasks[0]], 0)
     object.__setattr__(one.tasks[1], "assumptions", ())
     assert f"forward_kinematics: {told}" in json.loads(json_file.text(one, say))["remarks"]

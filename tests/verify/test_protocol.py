@@ -15,9 +15,9 @@ from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
 from plumbob.verify import schema
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Failure, FailureKind
-from plumbob.verify.door import LIMITS, open_contestant
-from plumbob.verify.fault_programs import contestant_of, source_of
+from plumbob.verify.connections import LIMITS, open_connection
+from plumbob.verify.exchange import Answer, Failure, FailureKind
+from plumbob.verify.fault_programs import connection_to, source_of
 from plumbob.verify.functions import MOST_POINTS
 from plumbob.verify.greeting import MOST_ITERATIONS, PROTOCOL, Greeting
 from plumbob.verify.message import encode_case, encode_greeting
@@ -173,11 +173,11 @@ RIGHT = {
 
 @pytest.mark.parametrize("name", RIGHT)
 def test_answers_of_the_page_are_those_of_right_programs(name):
-    contestant, compared = contestant_of(source_of(name)), 0
+    connection, compared = connection_to(source_of(name)), 0
     for request, expected in SOLVED:
         if request["task"] != RIGHT[name] or request.get("method") == "fabrik":
             continue
-        answer = contestant.answer(case_of(request))
+        answer = connection.answer(case_of(request))
         for output in (expected.keys() - {"id"}) & answer.values.keys():
             np.testing.assert_allclose(answer.values[output], expected[output], atol=1e-12)
             compared += 1
@@ -213,9 +213,9 @@ def stub(tmp_path):
         "    print(json.dumps({**answer, 'id': number}), flush=True)\n",
         encoding="utf-8",
     )
-    contestant = open_contestant([sys.executable, str(program)])
-    yield contestant
-    contestant.close()
+    connection = open_connection([sys.executable, str(program)])
+    yield connection
+    connection.close()
 
 
 def test_the_transcript_is_replayed_by_the_judge(stub):

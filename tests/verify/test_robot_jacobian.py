@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.robot_jacobian import CONVENTIONS, TASK, cases, right_jacobian
@@ -21,7 +21,7 @@ def world(inputs):
 
 def report_of(predict):
     functions = {TASK: lambda **inputs: {"jacobian": predict(inputs)}}
-    return verify(FunctionContestant(functions, GREETING)).tasks[0]
+    return verify(FunctionConnection(functions, GREETING)).tasks[0]
 
 
 @pytest.mark.parametrize("case", CASES[::3], ids=lambda case: case.name)

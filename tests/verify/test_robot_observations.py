@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from plumbob.reference.skeleton import Pose
-from plumbob.verify.contestant import Answer
+from plumbob.verify.exchange import Answer
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import CaseJudgement
 from plumbob.verify.kinematics import (

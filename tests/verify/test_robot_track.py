@@ -8,8 +8,8 @@ import pytest
 
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
-from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer, Exchange
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import robot_motions
@@ -88,8 +88,8 @@ HONEST = {
 @pytest.mark.sample("Levenberg")
 @pytest.mark.parametrize("name", HONEST)
 def test_no_honest_controller_is_accused(name):
-    contestant = FunctionContestant({TASK: HONEST[name]}, Greeting(PROTOCOL, (TASK,)))
-    report = verify(contestant).tasks[0]
+    connection = FunctionConnection({TASK: HONEST[name]}, Greeting(PROTOCOL, (TASK,)))
+    report = verify(connection).tasks[0]
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert not report.diagnosis.explanations
 
@@ -181,8 +181,8 @@ def test_speeds_that_are_reported_are_those_of_the_coordinates():
 def test_answers_without_numbers_are_broken():
     case = all_cases()["rest"]
     assert broken(case, np.full((32, 7), np.nan)) == {"numbers": Verdict.BROKEN}
-    contestant = FunctionContestant({TASK: lambda h: {"velocities": np.zeros((1, 7))}}, GREETING)
-    assert verify(contestant).verdict is Verdict.BROKEN
+    connection = FunctionConnection({TASK: lambda h: {"velocities": np.zeros((1, 7))}}, GREETING)
+    assert verify(connection).verdict is Verdict.BROKEN
 
 
 def test_quaternions_of_either_sign_are_compared_with_the_same_curve():

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer, Exchange
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import robot_jacobian
@@ -39,7 +39,7 @@ def damped(J, twist, damping):
 
 def report_of(solve):
     functions = {TASK: lambda **inputs: {"velocities": solve(*equation(inputs))}}
-    return verify(FunctionContestant(functions, GREETING)).tasks[0]
+    return verify(FunctionConnection(functions, GREETING)).tasks[0]
 
 
 def test_speeds_of_least_length_are_right_and_said_to_be():

@@ -10,8 +10,8 @@ from plumbob.crosscheck.engines import MujocoRobot
 from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import urdf
 from plumbob.reference.skeleton import Pose
-from plumbob.verify.contestant import Answer, Exchange
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.exchange import Answer, Exchange
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import robot_models, robot_targets
@@ -47,7 +47,7 @@ def near_cases():
 
 def judged(function, cases=None):
     cases = few_cases() if cases is None else cases
-    return judge_cases(FunctionContestant({TASK: function}, GREETING), TASK, "", cases)
+    return judge_cases(FunctionConnection({TASK: function}, GREETING), TASK, "", cases)
 
 
 def broken(report):

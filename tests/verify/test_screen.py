@@ -16,9 +16,9 @@ from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.text.sentence import Sentence, sentence, with_code
 from plumbob.verify import verify
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Failure, FailureKind
-from plumbob.verify.door import saved
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.connections import saved
+from plumbob.verify.exchange import Answer, Failure, FailureKind
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
     CaseJudgement,
@@ -55,7 +55,7 @@ def solver(forward=own_rotation, name=HOSTILE):
         "inverse_kinematics": raises,
         "mass_spring_step": fallen_too_far,
     }
-    return FunctionContestant(functions, Greeting(1, TASKS, name=name, methods=("ccd",)))
+    return FunctionConnection(functions, Greeting(1, TASKS, name=name, methods=("ccd",)))
 
 
 @pytest.fixture(scope="module", autouse=True)

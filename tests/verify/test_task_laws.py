@@ -12,7 +12,7 @@ import pytest
 from plumbob.text.sentence import sentence
 from plumbob.verify import laws
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, Exchange
+from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.explain import Match, Variant, _telling, explain
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
@@ -320,7 +320,7 @@ def test_what_is_assumed_is_a_reservation_and_what_is_asked_is_undecided(worst, 
     assumptions = (sentence("Something."),)
     assert report.verdict is worst
     assert replace(report, assumptions=assumptions).verdict is assumed
-    assert replace(report, assumptions=assumptions, is_asked=True).verdict is asked
+    assert replace(report, assumptions=assumptions, needs_declaration=True).verdict is asked
 
 
 def test_decimals_are_those_of_the_right_numbers_rounded(rng):

@@ -13,7 +13,7 @@ import msgspec
 import pytest
 from protocol_page import TRANSCRIPT
 
-from plumbob.verify.door import open_contestant
+from plumbob.verify.connections import open_connection
 from plumbob.verify.greeting import Fixed, Greeting, Step, System
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
@@ -208,12 +208,12 @@ def test_the_python_starter_declares_what_it_greets_with(tmp_path):
     path = tmp_path / "solver.py"
     text = template("python")["solver.py"].replace('"precision": "double"', '"precision": "single"')
     path.write_text(text)
-    for door in (open_contestant(str(path)), open_contestant([sys.executable, str(path)])):
+    for program in (open_connection(str(path)), open_connection([sys.executable, str(path)])):
         try:
-            assert door.greeting.precision == "single"
-            assert list(door.greeting.tasks) == OFFERED
+            assert program.greeting.precision == "single"
+            assert list(program.greeting.tasks) == OFFERED
         finally:
-            door.close()
+            program.close()
 
 
 def test_an_unknown_language_is_refused():

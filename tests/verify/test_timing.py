@@ -4,7 +4,7 @@ import pytest
 
 from plumbob.text.sentence import sentence
 from plumbob.verify import timing
-from plumbob.verify.contestant import Answer, Failure, FailureKind
+from plumbob.verify.exchange import Answer, Failure, FailureKind
 
 UNTIMED = sentence("Not timed.")
 

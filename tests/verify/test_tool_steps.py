@@ -6,9 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from plumbob.verify.contestant import Answer, Exchange
 from plumbob.verify.disciplines import DISCIPLINES
-from plumbob.verify.fault_programs import coded_faults, contestant_of, source_of
+from plumbob.verify.exchange import Answer, Exchange
+from plumbob.verify.fault_programs import coded_faults, connection_to, source_of
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.kinematics import robot_targets
 from plumbob.verify.kinematics.robot_motions import STEPS
@@ -120,13 +120,13 @@ def test_frames_of_motions_are_poses_too():
 
 
 def test_a_known_fault_of_whole_motions_is_named():
-    contestant = contestant_of(coded_faults()["PB-ROBOT-091"].wrong_program)
-    motions = DISCIPLINES[TRACK].cases(contestant.greeting, "", 0, False)
+    connection = connection_to(coded_faults()["PB-ROBOT-091"].wrong_program)
+    motions = DISCIPLINES[TRACK].cases(connection.greeting, "", 0, False)
     exchanges = []
     for case in [case for case in motions if case.family == STEPS]:
-        answer = contestant.answer(case)
+        answer = connection.answer(case)
         exchanges.append(Exchange(case, answer, answer))
-    report = replace(DISCIPLINES[TRACK].judge(exchanges, contestant.greeting, ""),
-                     exchanges=exchanges, greeting=contestant.greeting)  # fmt: skip
-    (explanation, *_) = with_changed_line(report, contestant.greeting).diagnosis.explanations
+    report = replace(DISCIPLINES[TRACK].judge(exchanges, connection.greeting, ""),
+                     exchanges=exchanges, greeting=connection.greeting)  # fmt: skip
+    (explanation, *_) = with_changed_line(report, connection.greeting).diagnosis.explanations
     assert explanation.codes == ("PB-ROBOT-091",)

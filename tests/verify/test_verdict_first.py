@@ -11,9 +11,9 @@ import pytest
 
 from plumbob.verify import cause_search
 from plumbob.verify.cause_search import CauseSearch, NoSearch, SearchLimit
+from plumbob.verify.connections.command import CaseOptions
 from plumbob.verify.disciplines import DISCIPLINES
-from plumbob.verify.door.question import Question
-from plumbob.verify.functions import FunctionContestant
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.screen.files import WRONG, Files
 from plumbob.verify.screen.words import Presentation, speaker
@@ -67,11 +67,11 @@ def test_a_search_that_ends_early_costs_the_name_alone(
     monkeypatch.setattr(cause_search, "SECONDS", 0.5 if mishap is hangs else 60.0)
     monkeypatch.setattr(importlib.import_module(STAGES[stage]), stage, mishap)
     greeting, published = Greeting(1, ("mass_spring_forces",)), []
-    contestant = FunctionContestant({"mass_spring_forces": wrong_forces}, greeting)
-    report = verify(contestant, publish=published.append)
+    connection = FunctionConnection({"mass_spring_forces": wrong_forces}, greeting)
+    report = verify(connection, publish=published.append)
     assert [part.verdict for part in published] == [report.verdict]
     context = Presentation(speaker("en"), "en", ("mine.py",))
-    assert Files(None, None, None, tmp_path).write(report, Question(), context) == WRONG
+    assert Files(None, None, None, tmp_path).write(report, CaseOptions(), context) == WRONG
     screen = " ".join(capsys.readouterr().out.split())
     assert "mass_spring_forces WRONG" in screen
     assert MISHAPS[mishap] in screen
@@ -120,8 +120,8 @@ def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_
     context = Presentation(speaker("en"), "en", ("mine.py",))
 
     def code_of(*tasks):
-        report = verify(FunctionContestant(functions, Greeting(1, tasks)))
-        return Files(None, None, None, tmp_path).write(report, Question(), context)
+        report = verify(FunctionConnection(functions, Greeting(1, tasks)))
+        return Files(None, None, None, tmp_path).write(report, CaseOptions(), context)
 
     assert code_of("energy", "mass_spring_forces") == WRONG  # the verdict that stands
     screen = " ".join(capsys.readouterr().out.split())
@@ -134,11 +134,11 @@ def test_a_judge_that_fails_at_a_task_keeps_the_other_verdicts(monkeypatch, tmp_
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_screen_that_cannot_be_drawn_leaves_the_verdict(monkeypatch, tmp_path, capsys):
     functions = {"mass_spring_forces": wrong_forces}
-    report = verify(FunctionContestant(functions, Greeting(1, tuple(functions))))
+    report = verify(FunctionConnection(functions, Greeting(1, tuple(functions))))
     module = importlib.import_module("plumbob.verify.screen.terminal")
     monkeypatch.setattr(module, "show", fails)
     context = Presentation(speaker("en"), "en", ("mine.py",))
-    assert Files(None, None, None, tmp_path).write(report, Question(), context) == WRONG
+    assert Files(None, None, None, tmp_path).write(report, CaseOptions(), context) == WRONG
     printed = capsys.readouterr()
     assert "mass_spring_forces: WRONG, " in printed.out
     assert "could not be written: KeyError: 'a mistake of ours'" in printed.err

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob.verify.door.question import Question
-from plumbob.verify.fault_programs import coded_faults, contestant_of
+from plumbob.verify.connections.command import CaseOptions
+from plumbob.verify.fault_programs import coded_faults, connection_to
 from plumbob.verify.screen import files, json_file, terminal
 from plumbob.verify.screen.files import Files
 from plumbob.verify.screen.words import Presentation, speaker
@@ -18,7 +18,7 @@ from plumbob.verify.verify import verify
 @pytest.fixture(scope="module")
 def judged():
     (fault,) = (one for one in coded_faults().values() if one.name == "gravity g/m")
-    return verify(contestant_of(fault.wrong_program))
+    return verify(connection_to(fault.wrong_program))
 
 
 @pytest.fixture
@@ -37,7 +37,7 @@ def test_a_failing_writer_costs_no_verdict(writer, report, monkeypatch, capsys):
     names = {"json_file": "text", "junit": "text", "page": "render", "saved": "save"}
     monkeypatch.setattr(getattr(files, writer), names[writer], raises)
     context = Presentation(speaker("en"), "en", ["my.py"])
-    code = Files(None, None, None, Path("out")).write(report, Question(), context)
+    code = Files(None, None, None, Path("out")).write(report, CaseOptions(), context)
     out, err = capsys.readouterr()
     assert code == 1  # a mistake of ours in a file leaves the exit code to the verdict
     assert "mass_spring_forces" in out
@@ -53,7 +53,7 @@ def test_a_failing_writer_costs_no_verdict(writer, report, monkeypatch, capsys):
 def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
     Path("plumbob_failures").write_text("a file")
     code = Files(None, None, None, None).write(
-        report, Question(), Presentation(speaker("en"), "en", ["my.py"])
+        report, CaseOptions(), Presentation(speaker("en"), "en", ["my.py"])
     )
     out, err = capsys.readouterr()
     assert code == 2
@@ -72,7 +72,7 @@ def test_files_are_written_though_nobody_reads_the_screen(report, monkeypatch):
     monkeypatch.setattr(terminal, "show", closed)
     monkeypatch.setattr(Path, "write_text", lambda path, *_, **__: order.append(path.name))
     Files(None, None, None, Path("out")).write(
-        report, Question(), Presentation(speaker("en"), "en", ["my.py"])
+        report, CaseOptions(), Presentation(speaker("en"), "en", ["my.py"])
     )
     assert order == ["verdict.json", "verdict.xml", "index.html", "screen"]
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case
-from ..contestant import Answer, Exchange, Failure
+from ..exchange import Answer, Exchange, Failure
 from ..gaps import difference
 from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable

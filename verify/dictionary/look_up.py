@@ -9,7 +9,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Contestant, Exchange, Failure
+from ..exchange import Answer, Connection, Exchange, Failure
 from ..fault_programs import IN_DICTIONARY, source_of
 from ..gaps import difference
 from ..greeting import Greeting
@@ -41,7 +41,7 @@ class Proposals(NamedTuple):
     hint: Sentence | None = None  # why nothing is looked up, or that no file can be read
 
 
-def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) -> Proposals | None:
+def look_up(connection: Connection, task: str, method: str, greeting: Greeting) -> Proposals | None:
     """Return the changes that a new process of a solver answers like, None without a dictionary.
 
     Each request is looked up alone as well: a second mistake may hide the first in another.
@@ -56,8 +56,8 @@ def look_up(contestant: Contestant, task: str, method: str, greeting: Greeting) 
             dictionaries[own] = _dictionary(task, own)
         except (OSError, ValueError):
             return Proposals(hint=_unreadable(file_of(task, own).name))
-    contestant.close()
-    first, second = ([contestant.answer(case) for case in cases] for _ in range(2))
+    connection.close()
+    first, second = ([connection.answer(case) for case in cases] for _ in range(2))
     if not all(map(_is_same, first, second)):
         return Proposals(hint=UNSTEADY)
     tolerance, *_ = TOLERANCES[greeting.precision]

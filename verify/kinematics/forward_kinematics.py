@@ -10,7 +10,7 @@ from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport
 from ..laws import digits, finding, judge_case, not_finite, of_joints

@@ -13,7 +13,7 @@ from plumbob.reference.skeleton import Skeleton
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange, Failure, FailureKind
+from ..exchange import Answer, Exchange, Failure, FailureKind
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import digits, finding, judge_case

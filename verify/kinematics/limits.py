@@ -16,7 +16,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.articulation import clamp_ball
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import finding, judge_case

@@ -7,7 +7,7 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import (
     CaseJudgement,
     Diagnosis,

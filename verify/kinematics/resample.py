@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case

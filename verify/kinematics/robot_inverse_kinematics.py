@@ -13,7 +13,7 @@ from plumbob.reference.judging import PoseJudgement
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite

@@ -12,7 +12,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints

@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Exchange
+from ..exchange import Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite

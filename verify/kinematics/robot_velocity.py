@@ -14,7 +14,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange, Failure
+from ..exchange import Answer, Exchange, Failure
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite

@@ -14,7 +14,7 @@ from plumbob.reference import rotation
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..gaps import difference
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict

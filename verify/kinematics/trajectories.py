@@ -13,7 +13,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..judgement import Finding
 from ..laws import finding
 from .robot_models import ancestors, mechanism, tool_pose

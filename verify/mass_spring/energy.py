@@ -14,7 +14,7 @@ from plumbob.reference.mass_spring import kinetic_energy, potential_energy
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import (
     CaseJudgement,

@@ -11,7 +11,7 @@ from plumbob.reference.mass_spring import forces as reference_forces
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, first_broken
 from ..laws import digits, finding, hints_of, judge_case

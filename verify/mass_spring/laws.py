@@ -11,7 +11,7 @@ from plumbob.reference.judging import StepJudgement, judge_step
 from plumbob.text.sentence import Sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Step
 from ..judgement import Finding, Verdict
 from ..laws import finding

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from .honest import ASPECTS, Option, compatible, declared, declared_choices, honest, model_of
 from .laws import SOLVED, Rounding, relative_gap, rounding

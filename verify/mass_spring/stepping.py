@@ -15,7 +15,7 @@ from plumbob.reference.mass_spring import State
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..greeting import Greeting, Step
 from ..judgement import (
     CaseJudgement,

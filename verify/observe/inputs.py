@@ -10,7 +10,7 @@ from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.text.sentence import sentence
 
 from ..case import Case
-from ..contestant import Answer, Contestant, is_hung
+from ..exchange import Answer, Connection, is_hung
 from ..gaps import difference
 from ..greeting import Greeting
 from ..kinematics.pose_laws import read_pose
@@ -48,12 +48,12 @@ CLAIMS = {"residual", "iterations", "converged"}
 
 
 def unread_inputs(
-    contestant: Contestant, cases: Sequence[Case], greeting: Greeting, method: str
+    connection: Connection, cases: Sequence[Case], greeting: Greeting, method: str
 ) -> list[str]:
     """Return the inputs that change no answer to enough requests, where right answers change."""
     counts: dict[str, list[bool]] = {}
     for case in _telling(cases):
-        before = contestant.answer(case)
+        before = connection.answer(case)
         if not isinstance(before, Answer):
             continue
         for name, changed in _changes(case, greeting):
@@ -61,7 +61,7 @@ def unread_inputs(
             is_hidden = name == "tolerance" and not _arrives(case, before)
             if is_hidden or not _matters(case, changed, method):
                 continue
-            answer = contestant.answer(replace(case, inputs=changed))
+            answer = connection.answer(replace(case, inputs=changed))
             if is_hung(answer):
                 return []
             is_same = isinstance(answer, Answer) and _are_same(before, answer)

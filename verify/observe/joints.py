@@ -13,7 +13,7 @@ import numpy as np
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray, IndexArray
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve

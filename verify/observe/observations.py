@@ -11,7 +11,7 @@ import numpy as np
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer, Contestant, Failure, FailureKind, is_hung
+from ..exchange import Answer, Connection, Failure, FailureKind, is_hung
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics import forward_kinematics, problems
@@ -35,7 +35,7 @@ ENDS = (FailureKind.CRASHED, FailureKind.HUNG, FailureKind.MEMORY)
 SENTENCES, RIGHT = 3, 4
 
 
-def observe(contestant: Contestant, report: TaskReport, seed: int) -> tuple[Sentence, ...]:
+def observe(connection: Connection, report: TaskReport, seed: int) -> tuple[Sentence, ...]:
     """Return what the answers to a task show, () if they are not wrong or too few.
 
     The solver is asked about 20 requests more, and some again with one input changed.
@@ -47,16 +47,16 @@ def observe(contestant: Contestant, report: TaskReport, seed: int) -> tuple[Sent
         or report.verdict < Verdict.WRONG
         or len(answered) < (1 if report.task in OF_SPRINGS else MIN_ANSWERS)
         or is_stuck
-        or contestant.greeting.system.continues
+        or connection.greeting.system.continues
     ):
         return ()
-    method, greeting = report.method.lower(), report.greeting or contestant.greeting
+    method, greeting = report.method.lower(), report.greeting or connection.greeting
     cases = _telling_cases(report, greeting, seed)
-    answered += _ask(contestant, cases, method)
+    answered += _ask(connection, cases, method)
     if len(answered) < MIN_ANSWERS:
         return ()
     counted = [judgement.case for judgement in report.judgements]
-    unread = inputs.unread_inputs(contestant, counted, greeting, method)
+    unread = inputs.unread_inputs(connection, counted, greeting, method)
     with np.errstate(all="ignore"):
         return sentences(report, answered, greeting, unread)
 
@@ -75,14 +75,14 @@ def _telling_cases(report: TaskReport, greeting: Greeting, seed: int) -> list[Ca
     return [] if report.task in robots.TASKS else spring_cases(report.task, greeting, seed)
 
 
-def _ask(contestant: Contestant, cases: Sequence[Case], method: str) -> list[CaseJudgement]:
+def _ask(connection: Connection, cases: Sequence[Case], method: str) -> list[CaseJudgement]:
     """Return the answers to requests, with the right ones of kinematics, and without findings.
 
     Requests without an answer are left out; after a crash or a hang no more are sent.
     """
     judgements = []
     for case in cases:
-        answer = contestant.answer(case)
+        answer = connection.answer(case)
         if isinstance(answer, Failure):
             if answer.kind in ENDS:
                 break

@@ -13,7 +13,7 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement
 from ..mass_spring.problem import problem_of
 from .fits import INDEPENDENT

@@ -10,7 +10,7 @@ from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement
 from ..kinematics import robot_jacobian, robot_targets, robot_velocity
 from ..kinematics.robot_models import ancestors, mechanism, tool_pose

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case
-from ..contestant import Answer, Exchange, Failure
+from ..exchange import Answer, Exchange, Failure
 from ..gaps import difference
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..kinematics.sweeps import ROUNDED, PoseTrial

@@ -12,8 +12,8 @@ import numpy as np
 from plumbob.text.sentence import Sentence, with_code
 
 from ..case import Case
-from ..contestant import Answer, Exchange
 from ..dictionary.entry import ChangePair, Entry
+from ..exchange import Answer, Exchange
 from ..explain import Variant, explain, together
 from ..fault_programs import CodedFault, coded_faults, source_of
 from ..gaps import difference

@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from .changes import CONSTANT
 from .mutants import Mutant, Program
 

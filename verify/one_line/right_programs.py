@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..case import Case
-from ..contestant import Answer, Exchange
+from ..exchange import Answer, Exchange
 from ..fault_programs import PROGRAMS, CodedFault, coded_faults, source_of
 from ..functions import call
 from ..greeting import Step

@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..contestant import Answer, Contestant, Exchange
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..dictionary.requests import TASKS
+from ..exchange import Answer, Connection, Exchange
 from ..explain import MORE
 from ..fault_programs import IN_DICTIONARY, source_of
 from ..gaps import difference
@@ -39,14 +39,14 @@ NEAREST_KNOWN, NEAREST = 8, 2
 def with_changed_line(
     report: TaskReport,
     greeting: Greeting,
-    contestant: Contestant | None = None,
+    connection: Connection | None = None,
     known_alone: bool = False,
 ) -> TaskReport:
     """Return a report on wrong answers with the fault or changed line that explains them.
 
     Beside a mistake that explains most answers, or where all targets are reached, the search is for
     known faults that explain all; so it is if `known_alone`, among those that are looked up. A
-    `contestant` can be asked for what a dictionary tells apart.
+    `connection` can be asked for what a dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
     if report.verdict > Verdict.RIGHT_EXCEPT:
@@ -60,8 +60,8 @@ def with_changed_line(
             return report
         share = 1.0
     proposals = None
-    if contestant is not None and report.verdict >= Verdict.WRONG:
-        proposals = look_up(contestant, report.task, report.method, greeting)
+    if connection is not None and report.verdict >= Verdict.WRONG:
+        proposals = look_up(connection, report.task, report.method, greeting)
         if proposals is not None and proposals.hint is not None:
             hints = (*report.diagnosis.hints, proposals.hint)
             report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))

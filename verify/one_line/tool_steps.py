@@ -13,7 +13,7 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 
 from ..case import Case
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement, TaskReport
 from ..kinematics.robot_inverse_kinematics import trajectory_of
 from ..kinematics.robot_motions import TASK as TRACK

@@ -8,7 +8,7 @@ import numpy as np
 from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray, digits_apart
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement
 
 Outputs = Mapping[str, Any]

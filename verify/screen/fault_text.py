@@ -9,9 +9,9 @@ import numpy as np
 
 from plumbob.text.sentence import Say, Sentence, sentence
 
+from ..connections.saved import SavedCase, cases_of
 from ..disciplines import DISCIPLINES
-from ..door.saved import SavedCase, cases_of
-from ..fault_programs import FAMILIES, CodedFault, coded_faults, contestant_of
+from ..fault_programs import FAMILIES, CodedFault, coded_faults, connection_to
 from ..judgement import CaseJudgement, Verdict
 from ..verify import judge_cases, trials
 from .terminal import numbers, wrapped
@@ -132,14 +132,14 @@ def failure_of(fault: CodedFault) -> CaseJudgement | None:
 
     A single sweep that only differs from the textbook's stands back behind a whole solve.
     """
-    contestant, seed = contestant_of(fault.wrong_program), 0
-    ((task, method),) = trials(contestant.greeting, [fault.task])
-    cases = DISCIPLINES[task].cases(contestant.greeting, method, seed, False)
+    connection, seed = connection_to(fault.wrong_program), 0
+    ((task, method),) = trials(connection.greeting, [fault.task])
+    cases = DISCIPLINES[task].cases(connection.greeting, method, seed, False)
     first = None
     for case in cases:
         requests = cases_of(SavedCase(task, method, seed, False, case.name), cases)
         with np.errstate(all="ignore"):  # a wrong program may divide by zero
-            failure = judge_cases(contestant, task, method, requests).smallest_failure
+            failure = judge_cases(connection, task, method, requests).smallest_failure
         if failure and any(
             finding.verdict >= Verdict.WRONG and finding.law != "one sweep"
             for finding in failure.findings
@@ -147,4 +147,4 @@ def failure_of(fault: CodedFault) -> CaseJudgement | None:
             return failure
         first = first or failure
     # A single case may be undecided where all cases together show the fault.
-    return first or judge_cases(contestant, task, method, cases).smallest_failure
+    return first or judge_cases(connection, task, method, cases).smallest_failure

@@ -10,8 +10,8 @@ from typing import NamedTuple
 from plumbob.text.printable import visible
 from plumbob.text.sentence import Sentence, sentence
 
-from ..door import saved
-from ..door.question import Question
+from ..connections import saved
+from ..connections.command import CaseOptions
 from ..judgement import Report
 from . import json_file, junit, page, terminal
 from .words import GOOD, Presentation, verdict_line
@@ -45,15 +45,15 @@ class Files(NamedTuple):
         return tuple(path or self.folder / name for path, name in zip(paths, names, strict=True))
 
     def save(
-        self, report: Report, question: Question, context: Presentation
+        self, report: Report, options: CaseOptions, context: Presentation
     ) -> tuple[list[Path], Presentation, list[WriteFailure]]:
         """Write the files; return them, the context with the failing cases, and the failures."""
         failures: list[WriteFailure] = []
         folder = self.folder / "failures" if self.folder else FAILURES
-        options = folder, question.seed, question.thorough
+        arguments = folder, options.seed, options.thorough
         cases = {
-            (task.task, task.method): question.rerun
-            or _attempt(folder, partial(saved.save, task, *options), failures)
+            (task.task, task.method): options.rerun
+            or _attempt(folder, partial(saved.save, task, *arguments), failures)
             for task in report.tasks
         }
         context = context._replace(files={key: path for key, path in cases.items() if path})
@@ -69,13 +69,13 @@ class Files(NamedTuple):
         ]
         return [path for path in finished if path], context, failures
 
-    def write(self, report: Report, question: Question, context: Presentation) -> int:
+    def write(self, report: Report, options: CaseOptions, context: Presentation) -> int:
         """Write the files, print the screen, and return the exit code.
 
         It is 2 if a file cannot be written, and 3 if the judge failed at a task and the others are
         right. A mistake of ours in a screen or a file leaves it to the verdict.
         """
-        finished, context, failures = self.save(report, question, context)
+        finished, context, failures = self.save(report, options, context)
         if _attempt(SCREEN, partial(_show, report, context), failures):
             if finished:
                 print(" ".join(visible(str(path)) for path in finished))

@@ -7,7 +7,7 @@ import msgspec
 from plumbob.text.printable import all_visible
 from plumbob.text.sentence import Say
 
-from ..contestant import Answer, Failure
+from ..exchange import Answer, Failure
 from ..judgement import CaseJudgement, Finding, Report, TaskReport
 from ..message import plain
 from .words import GOOD, advice, remarks

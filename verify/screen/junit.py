@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from plumbob.text.sentence import Say
 
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict
 from .words import explanations, title
 

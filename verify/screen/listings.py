@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from plumbob.text.sentence import Say, Sentence, sentence
 
-from ..door.export import export_cases
+from ..connections.export import export_cases
 from ..task import TASKS, Field, Task
 from .terminal import paragraphs, wrapped
 

@@ -8,8 +8,8 @@ from plumbob.text.language import translator
 from plumbob.text.printable import visible
 from plumbob.text.sentence import Say, Sentence, codes_in, sentence
 
-from ..contestant import Failure
-from ..door import saved
+from ..connections import saved
+from ..exchange import Failure
 from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
 
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_EXCEPT)
@@ -192,7 +192,7 @@ def advice(tasks: Sequence[TaskReport]) -> Sentence:
         template = sentence("Next: write {task}, then run this again.")
         return Sentence(template.template, {"task": title(bad[0])})
     first = bad[0]
-    if first.is_asked:
+    if first.needs_declaration:
         return sentence("Next: declare what is meant in the greeting; correct the rest.")
     if first.verdict is Verdict.UNDECIDED and not first.diagnosis.explained:
         return (

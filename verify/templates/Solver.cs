@@ -23,23 +23,23 @@ class Request { // positions are x, y, z [m]; rotations are unit quaternions w, 
 
 static class Solver {
     // Fill in "positions" and "rotations", global, of all joints, as double[][].
-    static void ForwardKinematics(Request ask, Dictionary<string, object> answer) =>
+    static void ForwardKinematics(Request input, Dictionary<string, object> answer) =>
         throw new Exception("forward_kinematics is not written yet");
 
     // Fill in "local_rotations" that bring the joint `effector` to the target.
-    static void InverseKinematics(Request ask, Dictionary<string, object> answer) =>
+    static void InverseKinematics(Request input, Dictionary<string, object> answer) =>
         throw new Exception("inverse_kinematics is not written yet");
 
     // Fill in "positions" and "velocities" a time h later.
-    static void MassSpringStep(Request ask, Dictionary<string, object> answer) =>
+    static void MassSpringStep(Request input, Dictionary<string, object> answer) =>
         throw new Exception("mass_spring_step is not written yet");
 
     // Fill in "q", coordinates within their limits that bring the tool to the target, as double[].
-    static void RobotInverseKinematics(Request ask, Dictionary<string, object> answer) =>
+    static void RobotInverseKinematics(Request input, Dictionary<string, object> answer) =>
         throw new Exception("robot_inverse_kinematics is not written yet");
 
     // Fill in "jacobian", the tool's linear and angular velocity by joint, as 6 rows double[][].
-    static void RobotJacobian(Request ask, Dictionary<string, object> answer) =>
+    static void RobotJacobian(Request input, Dictionary<string, object> answer) =>
         throw new Exception("robot_jacobian is not written yet");
 
     // GREETING_FIELDS
@@ -52,7 +52,7 @@ static class Solver {
             ["robot_jacobian"] = RobotJacobian,
         };
         var offered = new List<string>(tasks.Keys);
-        tasks["greeting"] = (ask, answer) => {
+        tasks["greeting"] = (input, answer) => {
             (answer["protocol"], answer["tasks"]) = (1, offered);
             (answer["language"], answer["precision"]) = ("C#", "double");
         };
@@ -60,10 +60,10 @@ static class Solver {
         Console.SetOut(Console.Error); // what else is printed does no harm
         JsonSerializerOptions json = new() { IncludeFields = true, Converters = { new NullNaN() } };
         while (Console.ReadLine() is string line) {
-            var ask = JsonSerializer.Deserialize<Request>(line, json)!;
-            var reply = new Dictionary<string, object> { ["id"] = ask.id };
+            var input = JsonSerializer.Deserialize<Request>(line, json)!;
+            var reply = new Dictionary<string, object> { ["id"] = input.id };
             var watch = System.Diagnostics.Stopwatch.StartNew();
-            try { tasks[ask.task](ask, reply); reply["seconds"] = watch.Elapsed.TotalSeconds; }
+            try { tasks[input.task](input, reply); reply["seconds"] = watch.Elapsed.TotalSeconds; }
             catch (Exception e) { reply["error"] = e.Message; }
             answers.WriteLine(JsonSerializer.Serialize(reply, json));
         }

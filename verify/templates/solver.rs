@@ -48,41 +48,41 @@ fn robot_jacobian(robot: &Robot, q: &[f64]) -> Result<Vec<Vec<f64>>, String> {
     Err("robot_jacobian is not written yet".into())
 }
 
-fn solve_robot(task: &str, ask: &Request) -> Result<String, String> {
-    let robot = ask.robot()?;
+fn solve_robot(task: &str, request: &Request) -> Result<String, String> {
+    let robot = request.robot()?;
     if task == "robot_jacobian" {
-        let q: Vec<_> = ask.get("q")?;
+        let q: Vec<_> = request.get("q")?;
         let (jacobian, seconds) = timed(|| robot_jacobian(&robot, &q))?;
         return Ok(member("jacobian", &jacobian) + &seconds);
     }
-    let start: Vec<_> = ask.get("start")?;
-    let (position, rotation) = (ask.get("target_position")?, ask.get("target_rotation")?);
-    let (close, narrow) = (ask.get("tolerance")?, ask.get("tolerance_rotation")?);
-    let limit = ask.get("max_iterations")?;
+    let start: Vec<_> = request.get("start")?;
+    let (position, rotation) = (request.get("target_position")?, request.get("target_rotation")?);
+    let (close, narrow) = (request.get("tolerance")?, request.get("tolerance_rotation")?);
+    let limit = request.get("max_iterations")?;
     let (q, seconds) = timed(|| robot_inverse_kinematics(&robot, &start, position, rotation,
         close, narrow, limit))?;
     Ok(member("q", &q) + &seconds)
 }
 
-fn solve(task: &str, ask: &Request) -> Result<String, String> {
+fn solve(task: &str, request: &Request) -> Result<String, String> {
     if task.starts_with("robot") {
-        return solve_robot(task, ask);
+        return solve_robot(task, request);
     }
     if task == "mass_spring_step" {
-        let system = ask.system()?;
-        let (x, v, h) = (ask.get("positions")?, ask.get("velocities")?, ask.get("h")?);
+        let system = request.system()?;
+        let (x, v, h) = (request.get("positions")?, request.get("velocities")?, request.get("h")?);
         let ((x, v), seconds) = timed(|| mass_spring_step(&system, x, v, h))?;
         return Ok(member("positions", &x) + &member("velocities", &v) + &seconds);
     }
-    let (parents, offsets): (Vec<_>, Vec<_>) = (ask.get("parents")?, ask.get("offsets")?);
-    let local: Vec<_> = ask.get("local_rotations")?;
+    let (parents, offsets): (Vec<_>, Vec<_>) = (request.get("parents")?, request.get("offsets")?);
+    let local: Vec<_> = request.get("local_rotations")?;
     if task == "forward_kinematics" {
         let ((x, r), seconds) = timed(|| forward_kinematics(&parents, &offsets, &local))?;
         return Ok(member("positions", &x) + &member("rotations", &r) + &seconds);
     }
-    let (target, effector) = (ask.get("target")?, ask.get("effector")?);
-    let (tolerance, max_iterations) = (ask.get("tolerance")?, ask.get("max_iterations")?);
-    let method: String = ask.get("method")?;
+    let (target, effector) = (request.get("target")?, request.get("effector")?);
+    let (tolerance, max_iterations) = (request.get("tolerance")?, request.get("max_iterations")?);
+    let method: String = request.get("method")?;
     let (local, seconds) = timed(|| inverse_kinematics(&parents, &offsets, &local, target,
         effector, tolerance, max_iterations, &method))?;
     Ok(member("local_rotations", &local) + &seconds)

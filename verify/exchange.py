@@ -63,7 +63,7 @@ class Exchange:
     repeat: Answer | Failure
 
 
-class Contestant(Protocol):
+class Connection(Protocol):
     """Anyone's solver: a function, a program or a folder of answers."""
 
     @property

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from plumbob.text.sentence import Say, sentence
 
-from ..contestant import Contestant
 from ..disciplines import DISCIPLINES
+from ..exchange import Connection
 from ..judgement import Report
 from ..verify import Notify, judge_cases, verify
-from . import LIMITS, ProcessLimits, open_contestant, saved
-from .files import FileContestant
+from . import LIMITS, ProcessLimits, open_connection, saved
+from .files import FileConnection
 
 # The words before a program, and before a folder of answers.
 PROGRAM, ANSWERS = "--", "--answers"
@@ -28,17 +28,17 @@ def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
     return limits._replace(request=seconds, first=max(seconds, limits.first))
 
 
-def opened(words: Sequence[str], limits: ProcessLimits, say: Say) -> Contestant:
+def open_named(words: Sequence[str], limits: ProcessLimits, say: Say) -> Connection:
     """Return the solver that the words of a command line name; raise ValueError if none."""
     if words[:1] == [PROGRAM] and len(words) > 1:
-        return open_contestant(words[1:], limits)
+        return open_connection(words[1:], limits)
     if words[:1] == [ANSWERS] and len(words) > 2:
         raise ValueError(say(sentence(
             "answers: expected a folder in place of a solver, got {solver} as well",
             solver=" ".join(words[2:]),
         )))  # fmt: skip
     if words[:1] == [ANSWERS]:
-        return FileContestant(Path(words[1]))
+        return FileConnection(Path(words[1]))
     if not words or words == [PROGRAM]:
         raise ValueError(say(sentence(
             "solver: expected a Python file, module:object, or -- and a program, got none; "
@@ -50,11 +50,11 @@ def opened(words: Sequence[str], limits: ProcessLimits, say: Say) -> Contestant:
             "stands behind --, as in plumbob verify -- {program}",
             count=len(words), program=" ".join(words),
         )))  # fmt: skip
-    return open_contestant(words[0], limits)
+    return open_connection(words[0], limits)
 
 
-class Question(NamedTuple):
-    """The cases to ask; arguments as of `verify`."""
+class CaseOptions(NamedTuple):
+    """The cases that a command line names; arguments as of `verify`."""
 
     tasks: tuple[str, ...] = ()  # () for all that the solver offers
     rerun: Path | None = None  # a saved failing case, then the only one
@@ -62,40 +62,40 @@ class Question(NamedTuple):
     seed: int = 0
 
 
-def suited(question: Question, contestant: Contestant) -> Question:
-    """Return the question about the exported cases if the answers are files."""
-    if isinstance(contestant, FileContestant):
-        return question._replace(seed=contestant.seed, thorough=contestant.thorough)
-    return question
+def options_of_answers(options: CaseOptions, connection: Connection) -> CaseOptions:
+    """Return the options about the exported cases if the answers are files."""
+    if isinstance(connection, FileConnection):
+        return options._replace(seed=connection.seed, thorough=connection.thorough)
+    return options
 
 
-def ask(
-    contestant: Contestant,
-    question: Question,
+def judge(
+    connection: Connection,
+    options: CaseOptions,
     notify: Notify,
     publish: Callable[[Report], None] = lambda report: None,
 ) -> Report:
     """Return the report, and end the solver; call `publish` as `verify` does."""
     try:
-        report = _report(contestant, question, notify, publish)
+        report = _report(connection, options, notify, publish)
     finally:
-        contestant.close()  # its remarks are complete then
-    return replace(report, remarks=(*report.remarks, *contestant.remarks))
+        connection.close()  # its remarks are complete then
+    return replace(report, remarks=(*report.remarks, *connection.remarks))
 
 
 def _report(
-    contestant: Contestant,
-    question: Question,
+    connection: Connection,
+    options: CaseOptions,
     notify: Notify,
     publish: Callable[[Report], None],
 ) -> Report:
-    if question.rerun is None:
-        options = question.tasks or None, question.seed, question.thorough
-        return verify(contestant, *options, notify, publish)
-    case, greeting = saved.load(question.rerun), contestant.greeting
+    if options.rerun is None:
+        tasks, seed = options.tasks or None, options.seed
+        return verify(connection, tasks, seed, options.thorough, notify, publish)
+    case, greeting = saved.load(options.rerun), connection.greeting
     if case.task not in greeting.tasks or case.task not in DISCIPLINES:
         raise ValueError(f"--rerun: the solver does not offer the task {case.task!r}")
     cases = DISCIPLINES[case.task].cases(greeting, case.method, case.seed, case.thorough)
     cases = saved.cases_of(case, cases)
-    report = judge_cases(contestant, case.task, case.method, cases, notify)
+    report = judge_cases(connection, case.task, case.method, cases, notify)
     return Report(greeting, [report], case.seed)

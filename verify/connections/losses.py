@@ -10,7 +10,7 @@ from plumbob.process.child import ChildProcess, Loss
 from plumbob.text.printable import one_line
 from plumbob.text.sentence import Sentence, sentence
 
-from ..contestant import Failure, FailureKind
+from ..exchange import Failure, FailureKind
 
 # How many lines of standard error are shown.
 STDERR_SHOWN = 3

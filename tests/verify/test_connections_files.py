@@ -13,11 +13,11 @@ from hypothesis.extra import numpy as arrays
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
-from plumbob.verify.contestant import Answer, FailureKind, NoGreetingError
-from plumbob.verify.door import export, open_contestant
-from plumbob.verify.door.export import export_cases, write_cases
-from plumbob.verify.door.files import FileContestant, place_of
-from plumbob.verify.door.tables import read_table, write_table
+from plumbob.verify.connections import export, open_connection
+from plumbob.verify.connections.export import export_cases, write_cases
+from plumbob.verify.connections.files import FileConnection, place_of
+from plumbob.verify.connections.tables import read_table, write_table
+from plumbob.verify.exchange import Answer, FailureKind, NoGreetingError
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.task import TASKS, Field
 
@@ -81,10 +81,10 @@ def test_the_readme_names_every_file_and_output(folder):
 
 
 def test_a_folder_without_answers_says_what_to_write(folder):
-    contestant = FileContestant(folder)
-    assert contestant.greeting == GREETING
-    assert (contestant.seed, contestant.thorough) == (3, False)
-    failure = contestant.answer(CASES[0])
+    connection = FileConnection(folder)
+    assert connection.greeting == GREETING
+    assert (connection.seed, connection.thorough) == (3, False)
+    failure = connection.answer(CASES[0])
     assert failure.kind is FailureKind.ABSENT
     assert "expected answer.json or answer_positions.csv or" in str(failure.sentence)
 
@@ -102,13 +102,13 @@ def test_a_folder_without_answers_says_what_to_write(folder):
 def test_only_tasks_that_have_answers_are_judged(tmp_path, answered, tasks, methods, left_out):
     greeting = Greeting(1, GREETING.tasks, methods=("ccd", "my own")) if answered else GREETING
     write_cases(tmp_path / "cases", CASES, greeting)
-    contestant = FileContestant(tmp_path / "cases")
+    connection = FileConnection(tmp_path / "cases")
     for case in answered:
-        (contestant.folder / place_of(case) / "anwser.json").write_text("{}")  # as people write
-    (contestant.folder / place_of(CASES[1]) / ".hidden").write_text("")
-    assert contestant.greeting.tasks == tasks
-    assert contestant.greeting.methods == (methods if methods != ("",) else greeting.methods)
-    assert any("Left out" in str(one) for one in contestant.remarks) == left_out
+        (connection.folder / place_of(case) / "anwser.json").write_text("{}")  # as people write
+    (connection.folder / place_of(CASES[1]) / ".hidden").write_text("")
+    assert connection.greeting.tasks == tasks
+    assert connection.greeting.methods == (methods if methods != ("",) else greeting.methods)
+    assert any("Left out" in str(one) for one in connection.remarks) == left_out
 
 
 ANSWER = {"positions": [[1, 2, 3], [4, 5, None]], "seconds": 0.5}
@@ -125,13 +125,13 @@ JSON = {
 @pytest.mark.parametrize("name", JSON)
 def test_answers_in_json_are_read_each_time_the_same(folder, name):
     (folder / place_of(CASES[0]) / "answer.json").write_bytes(JSON[name])
-    contestant = FileContestant(folder)
+    connection = FileConnection(folder)
     for _ in range(2):
-        answer = contestant.answer(CASES[0])
+        answer = connection.answer(CASES[0])
         np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
         assert answer.seconds == 0.5
-    assert contestant.answer(CASES[1]).kind is FailureKind.ABSENT
-    assert "whether equal requests have equal answers is not known" in str(contestant.remarks[0])
+    assert connection.answer(CASES[1]).kind is FailureKind.ABSENT
+    assert "whether equal requests have equal answers is not known" in str(connection.remarks[0])
 
 
 DATA = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
@@ -143,7 +143,7 @@ ENCODINGS = ["utf-8", "utf-8-sig", "utf-16"]
 def test_answers_in_csv_are_understood(folder, name, encoding):
     place = folder / place_of(CASES[0])
     (place / "answer_positions.csv").write_bytes(DATA["csv"][name].encode(encoding))
-    answer = FileContestant(folder).answer(CASES[0])
+    answer = FileConnection(folder).answer(CASES[0])
     assert isinstance(answer, Answer), answer.sentence
     np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
     assert answer.seconds == 0.0
@@ -159,7 +159,7 @@ WRONG_TABLES = [
 def test_tables_that_are_not_understood_say_where(folder, row):
     data = row["data"].encode(errors="surrogateescape")
     (folder / place_of(CASES[0]) / "answer_positions.csv").write_bytes(data)
-    failure = FileContestant(folder).answer(CASES[0])
+    failure = FileConnection(folder).answer(CASES[0])
     assert failure.kind is FailureKind.GARBAGE
     assert f"positions: {row['words']}" in str(failure.sentence)
 
@@ -167,7 +167,7 @@ def test_tables_that_are_not_understood_say_where(folder, row):
 @pytest.mark.parametrize("row", DATA["wrong_json"], ids=lambda row: row["words"])
 def test_json_that_is_not_understood_says_why(folder, row):
     (folder / place_of(CASES[0]) / "answer.json").write_text(row["data"])
-    failure = FileContestant(folder).answer(CASES[0])
+    failure = FileConnection(folder).answer(CASES[0])
     assert failure.kind == row["kind"]
     assert row["words"] in str(failure.sentence)
 
@@ -175,7 +175,7 @@ def test_json_that_is_not_understood_says_why(folder, row):
 @pytest.mark.parametrize("name", ["answers.json", "answer_position.csv", "Answer.JSON"])
 def test_a_file_beside_its_name_is_named(folder, name):
     (folder / place_of(CASES[0]) / name).write_text("1,2,3", encoding="utf-8")
-    failure = FileContestant(folder).answer(CASES[0])
+    failure = FileConnection(folder).answer(CASES[0])
     assert failure.kind is FailureKind.ABSENT
     assert f"but {name}; did you mean answer" in str(failure.sentence)
 
@@ -185,7 +185,7 @@ def test_a_file_beside_its_name_is_named(folder, name):
 )
 def test_answers_to_other_cases_are_not_judged(folder, case):
     (folder / place_of(CASES[0]) / "answer.json").write_bytes(JSON["plain"])
-    failure = FileContestant(folder).answer(case)
+    failure = FileConnection(folder).answer(case)
     assert failure.kind is FailureKind.ABSENT
     assert "holds another case: export again" in str(failure.sentence)
 
@@ -210,9 +210,9 @@ def test_a_second_export_keeps_answers_and_what_the_folder_says_of_the_solver(
         "forward_kinematics/single_5_True\n"
     )
     assert answer.exists()
-    contestant = open_contestant(tmp_path / "a")
-    assert contestant.greeting.precision == "single"
-    assert (contestant.seed, contestant.thorough) == (5, True)
+    connection = open_connection(tmp_path / "a")
+    assert connection.greeting.precision == "single"
+    assert (connection.seed, connection.thorough) == (5, True)
 
 
 def test_a_folder_of_something_else_is_left_alone(tmp_path):
@@ -222,7 +222,7 @@ def test_a_folder_of_something_else_is_left_alone(tmp_path):
     with pytest.raises(ValueError, match="expected a folder, got the file"):
         write_cases(tmp_path / "thesis.txt", CASES, GREETING)
     with pytest.raises(ValueError, match="expected a folder of exported cases"):
-        FileContestant(tmp_path)
+        FileConnection(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["thesis.txt"]
 
 
@@ -234,7 +234,7 @@ def test_two_cases_never_share_a_folder(tmp_path):
 def test_a_greeting_that_is_not_understood_says_so(folder):
     (folder / "greeting.json").write_text('{"protocol": 1, "tasks": ["x"]}')
     with pytest.raises(NoGreetingError, match=r"greeting\.json: tasks: expected one of"):
-        _ = FileContestant(folder).greeting
+        _ = FileConnection(folder).greeting
 
 
 @given(arrays.arrays(np.float64, (2, 4, 3), elements=st.floats()))

@@ -5,12 +5,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from ..contestant import Contestant
-from .files import FileContestant
+from ..exchange import Connection
+from .files import FileConnection
 from .losses import LIMITS, ProcessLimits
-from .program import ProgramContestant
+from .program import ProgramConnection
 
-__all__ = ["LIMITS", "ProcessLimits", "open_contestant"]
+__all__ = ["LIMITS", "ProcessLimits", "open_connection"]
 
 # After this share of its time a solver's line is noted, in case it takes longer.
 NOTED_AFTER = 0.6
@@ -22,28 +22,28 @@ home, spec, folder, patience = sys.argv[1:]
 is_known = home in sys.path
 if not is_known:
     sys.path.insert(0, home)
-from plumbob.verify.door.host import serve
+from plumbob.verify.connections.host import serve
 if not is_known:
     sys.path.append(sys.path.pop(0))
 serve(spec, folder, float(patience))
 """
 
 
-def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Contestant:
+def open_connection(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Connection:
     """Return a solver of any kind, whose process starts with the first request.
 
     It is a command as a list of words; a Python file, file.py:object or module:object; a program's
     file; or a folder of answers. Raise ValueError if there is none of that name.
     """
     if not isinstance(spec, str | Path):
-        return ProgramContestant(spec, limits=limits)
+        return ProgramConnection(spec, limits=limits)
     text, path = str(spec), Path(spec)
     if path.is_dir():
-        return FileContestant(path)
+        return FileConnection(path)
     if text.partition(":")[0].endswith(".py") or (":" in text and not path.exists()):
-        return _python_contestant(text, limits)
+        return _python_connection(text, limits)
     if path.is_file() and os.access(path, os.X_OK):
-        return ProgramContestant([str(path.resolve())], limits=limits)
+        return ProgramConnection([str(path.resolve())], limits=limits)
     if path.is_file():
         raise ValueError(
             f"solver: expected a Python file or a program, got {text}, which is neither: give the "
@@ -55,7 +55,7 @@ def open_contestant(spec: str | Path | Sequence[str], limits: ProcessLimits = LI
     )
 
 
-def _python_contestant(spec: str, limits: ProcessLimits) -> ProgramContestant:
+def _python_connection(spec: str, limits: ProcessLimits) -> ProgramConnection:
     """Return the solver in a file, file.py:object or module:object, run by this interpreter.
 
     A file runs in its own folder, a module in the working directory.
@@ -69,4 +69,4 @@ def _python_contestant(spec: str, limits: ProcessLimits) -> ProgramContestant:
         folder, spec = path.parent, f"{path}{colon}{attribute}"
     patience = str(NOTED_AFTER * limits.request)
     command = [sys.executable, "-P", "-c", _START, _HOME, spec, str(folder), patience]
-    return ProgramContestant(command, folder, limits)
+    return ProgramConnection(command, folder, limits)

@@ -22,7 +22,7 @@ import msgspec
 from plumbob.process.child import take_streams
 from plumbob.text.sentence import did_you_mean
 
-from ..contestant import Answer, Failure, FailureKind
+from ..exchange import Answer, Failure, FailureKind
 from ..functions import call, describe_exception, takes
 from ..greeting import PROTOCOL
 from ..message import GREETING, Request, decode_greeting, decode_request, encode_answer, excerpt
@@ -160,7 +160,7 @@ def load(spec: str) -> PythonSolver:
 
 
 def _load_file(path: Path) -> Any:
-    name = path.stem if path.stem not in sys.modules else f"contestant_{path.stem}"
+    name = path.stem if path.stem not in sys.modules else f"solver_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
     assert spec.loader is not None

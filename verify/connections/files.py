@@ -13,7 +13,7 @@ from plumbob.text.sentence import Sentence, did_you_mean, sentence
 
 from .. import message
 from ..case import Case
-from ..contestant import Answer, Failure, FailureKind, NoGreetingError
+from ..exchange import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..task import TASKS, Task
 from .losses import LIMITS
@@ -71,7 +71,7 @@ def _exported(task: Task) -> set[str]:
     return {REQUEST, *(f"{definition.name}.csv" for definition in task.inputs)}
 
 
-class FileContestant:
+class FileConnection:
     """A solver that answers by files; `seed` and `thorough` are those of its cases.
 
     Raise ValueError if it is no folder of exported cases.

@@ -13,7 +13,7 @@ from plumbob.reference.formats.source import read_bytes
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..contestant import Answer
+from ..exchange import Answer
 from ..judgement import TaskReport
 from ..message import plain
 

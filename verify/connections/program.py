@@ -1,4 +1,4 @@
-"""Any program as a contestant: JSON lines on its standard input and output."""
+"""Any program as a connection: JSON lines on its standard input and output."""
 
 import time
 from collections.abc import Mapping, Sequence
@@ -12,14 +12,14 @@ from plumbob.text.sentence import Sentence, sentence
 
 from .. import message
 from ..case import Case
-from ..contestant import Answer, Failure, FailureKind, NoGreetingError
+from ..exchange import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
 from ..task import TASKS
 from .claimed_time import ClaimedTimes
 from .losses import LIMITS, FailureError, ProcessLimits, departure, failure_of, garbage, not_started
 
 
-class ProgramContestant:
+class ProgramConnection:
     """A program, started for its first request, and anew after a loss."""
 
     def __init__(
