@@ -450,7 +450,8 @@ def _excess_batch(joints, q, excess):
 def _locals_batch(joints, q, offsets, rotations):
     unit = np.empty(q.shape[1])
     for i in range(len(q)):
-        unit[:] = q[i]
+        for k in range(len(unit)):  # a slice would compile numba's messages about shapes
+            unit[k] = q[i, k]
         if not normalise_start(joints, unit):
             return False
         for j in range(len(joints)):
@@ -471,7 +472,8 @@ def _forward_one(joints, q, positions, rotations):
 def _forward_batch(joints, q, positions, rotations):
     unit = np.empty(q.shape[1])
     for i in range(len(q)):
-        unit[:] = q[i]
+        for k in range(len(unit)):
+            unit[k] = q[i, k]
         if not normalise_start(joints, unit):
             return False
         articulated_pose(joints, unit, positions[i], rotations[i])
