@@ -11,7 +11,7 @@ import command_names
 import numpy as np
 import pytest
 
-from plumbob.bench.harness.record import Record, RecordFile
+from plumbob.bench.measure.record import Record, RecordFile
 from plumbob.cli import bench, terminal
 from plumbob.cli import main as cli
 from plumbob.cli.help_text import epilog

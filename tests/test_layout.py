@@ -27,8 +27,8 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 LINES = PROJECT["tool"]["plumbob"]["lines"]
 FOLDERS = set(ROOMS) - GROUND - {"plumbob"}  # linked into `plumbob`, imported as its packages
 BENCH = [  # each may import those before it
-    "problems", "peers", "harness", "tables", "ranking", "figures", "motion", "experiments",
-    "comparison", "report", "show",
+    "problems", "peers", "measure", "tables", "ranking", "figures", "player", "experiments",
+    "compare", "page", "show",
 ]  # fmt: skip
 LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # llvmlite is numba's own
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
@@ -174,13 +174,13 @@ SLIPS = [
     (arrows_against_the_direction, "plumbob/text/a.py", "from plumbob.reference import quaternion"),
     (relative_steps_out, "plumbob/process/a.py", "from ..text.printable import visible"),
     (arrows_against_the_direction, "crosscheck/a.py", "def f():\n    import plumbob.bench.run"),
-    (arrows_against_the_direction, "crosscheck/a.py", "import_module('plumbob.bench.harness.run')"),
+    (arrows_against_the_direction, "crosscheck/a.py", "import_module('plumbob.bench.measure.run')"),
     (arrows_against_the_direction, "bench/a.py", "from tests import conftest"),
     (arrows_against_the_direction, "bench/a.py", "from plumbob import solve_ik"),
     (arrows_against_the_direction, "reference/a.py", "import plumbob"),
-    (arrows_against_the_direction_in_bench, "bench/peers/ik/a.py", "from ...harness.run import a"),
-    (arrows_against_the_direction_in_bench, "bench/harness/a.py", "from .. import experiments"),
-    (arrows_against_the_direction_in_bench, "bench/experiments/b/a.py", "from ...report import a"),
+    (arrows_against_the_direction_in_bench, "bench/peers/ik/a.py", "from ...measure.run import a"),
+    (arrows_against_the_direction_in_bench, "bench/measure/a.py", "from .. import experiments"),
+    (arrows_against_the_direction_in_bench, "bench/experiments/b/a.py", "from ...page import a"),
     (judgements_in_bench, "bench/a.py", "from plumbob.verify.laws import LAWS"),
     (bare_imports, "plumbob/a.py", "from reference import solve_ik"),
     (relative_steps_out, "bench/peers/a.py", "from ...reference import solve_ik"),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.comparison.rows import ChangeVerdict
+from plumbob.bench.compare.rows import ChangeVerdict
 from plumbob.bench.ranking.scores import OUTCOMES
 from plumbob.cli import file_readings as files
 from plumbob.reference.outcome import Outcome

@@ -13,7 +13,7 @@ from draw_lab import DOCS, shorten
 from matplotlib.animation import FuncAnimation, PillowWriter
 from matplotlib.figure import Figure
 
-from plumbob.bench.motion.motion import Scene
+from plumbob.bench.player.motion import Scene
 from plumbob.bench.show import picture, scenes
 from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.bench.show.scenes import CLOTH, EXACT

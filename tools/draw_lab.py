@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from plumbob.bench.experiments import pictures
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness.block import SCALES
-from plumbob.bench.harness.measure import record_of
+from plumbob.bench.measure.block import SCALES
+from plumbob.bench.measure.measure import record_of
 from plumbob.bench.tables.results import Results
 from plumbob.reference import ImplicitEuler, scenes
 

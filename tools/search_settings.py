@@ -20,8 +20,8 @@ import msgspec
 import numpy as np
 
 from plumbob.bench.experiments.robots import TOLERANCE
-from plumbob.bench.harness.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
-from plumbob.bench.harness.timing import Job, answers
+from plumbob.bench.measure.metrics import CONFIDENCE, chance_of_pairs, shifted_geometric_mean
+from plumbob.bench.measure.timing import Job, answers
 from plumbob.bench.peers import peer as peers
 from plumbob.bench.peers.catalogue import PEERS
 from plumbob.bench.problems.evaluate import Targets, arbiter_of, evaluator_of

@@ -9,8 +9,8 @@ import sys
 import tempfile
 from pathlib import Path
 
-from plumbob.bench.harness.record import FILE_NAME, RecordFile
-from plumbob.bench.report.report import BenchReport, write
+from plumbob.bench.measure.record import FILE_NAME, RecordFile
+from plumbob.bench.page.report import BenchReport, write
 from plumbob.bench.tables.layout import provenance
 from plumbob.bench.tables.results import listed
 from plumbob.bench.tables.table import words

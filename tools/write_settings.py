@@ -13,7 +13,7 @@ from pathlib import Path
 
 import search_settings as tuning
 
-from plumbob.bench.harness import metrics
+from plumbob.bench.measure import metrics
 from plumbob.bench.problems.robots import TUNING, title
 
 FOLDER = Path(__file__).parents[1] / "docs" / "peers"

@@ -9,11 +9,11 @@ import numpy as np
 from plumbob.reference import IK_SOLVERS, IKSolution, Skeleton, forward_kinematics, rotation, track
 from plumbob.reference.arguments import FloatArray
 
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.chain_targets import SolverLimits, solve_targets
-from ..harness.record import Record
-from ..harness.values import Floats1, Integers1
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.chain_targets import SolverLimits, solve_targets
+from ..measure.record import Record
+from ..measure.values import Floats1, Integers1
 from ..problems.chains import BEYOND
 from ..problems.curves import CURVE, FollowedCurve, arm_beyond, arm_curves
 from .chain import BEYOND_TOLERANCE, CHAIN, ChainSolves, SolveWords

@@ -15,11 +15,11 @@ from plumbob.reference import Target, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import urdf
 
-from ..harness.block import Block, Group, Measured, Scale
-from ..harness.isolation import in_a_fresh_process
-from ..harness.progress import announce
-from ..harness.record import Record
-from ..harness.values import Floats1, Integers1, Values
+from ..measure.block import Block, Group, Measured, Scale
+from ..measure.isolation import in_a_fresh_process
+from ..measure.progress import announce
+from ..measure.record import Record
+from ..measure.values import Floats1, Integers1, Values
 from ..peers.axes import REVOLUTION, all_within
 from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
 from ..peers.protocol import SolveFactory

@@ -10,9 +10,9 @@ import numpy as np
 
 from plumbob.reference import IK_SOLVERS
 
-from ..harness import metrics
-from ..harness.block import Block, Scale
-from ..harness.chain_targets import (
+from ..measure import metrics
+from ..measure.block import Block, Scale
+from ..measure.chain_targets import (
     SUITE,
     ChainJob,
     SolverLimits,
@@ -21,9 +21,9 @@ from ..harness.chain_targets import (
     solve_one_by_one,
     solve_targets,
 )
-from ..harness.measure import not_asked
-from ..harness.record import Record
-from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure.measure import not_asked
+from ..measure.record import Record
+from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.user_solver import CHAIN_TASK
 from ..problems.chains import BEYOND, SEED, STRATA, TargetsForSkeleton, chain_targets

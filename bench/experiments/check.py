@@ -3,9 +3,9 @@
 from collections.abc import Iterator, Sequence
 from functools import partial
 
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Values
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Values
 
 
 class ClaimWords(Values, frozen=True, kw_only=True):
@@ -68,7 +68,7 @@ def evaluate(name: str) -> Measured:
 
 from plumbob.reference.arguments import distinct_texts
 
-from ..harness import metrics
+from ..measure import metrics
 from ..peers.catalogue import MUJOCO, PINOCCHIO
 from ..tables.captions import Captions
 from ..tables.columns import folded, of_numbers, text

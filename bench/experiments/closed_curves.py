@@ -14,10 +14,10 @@ from plumbob.reference import IK_SOLVERS, IKSolution, Outcome, Skeleton, rotatio
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import difference
 
-from ..harness import metrics
-from ..harness.block import SCALES, Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Floats1
+from ..measure import metrics
+from ..measure.block import SCALES, Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Floats1
 from ..problems.curves import (
     CURVE,
     DRIFT_FRAMES,

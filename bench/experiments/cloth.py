@@ -11,10 +11,10 @@ from plumbob.reference import ImplicitEuler, MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Floats1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Floats1, Values
 from ..peers import catalogue
 from ..problems.cloth_swing import (
     FALLING,

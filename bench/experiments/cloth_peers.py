@@ -19,12 +19,12 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import SystemArrays
 
 from ..clock import compute_time_of, time_call
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.isolation import JobOutcome, Message, Ready, Solved, WorkerProcess
-from ..harness.measure import not_installed
-from ..harness.timing import messages_of
-from ..harness.values import Floats1, Integers1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.isolation import JobOutcome, Message, Ready, Solved, WorkerProcess
+from ..measure.measure import not_installed
+from ..measure.timing import messages_of
+from ..measure.values import Floats1, Integers1, Values
 from ..peers import catalogue
 from ..peers.peer import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, Peer
 from ..peers.protocol import Mover, OwnTime
@@ -555,7 +555,7 @@ def worker_process() -> WorkerProcess:
 from ..figures.chart import Panel, Series, series
 from ..figures.chart_sketch import declared_chart
 from ..figures.sketch import Sketch
-from ..harness.record import Record
+from ..measure.record import Record
 from ..tables.captions import Captions
 from ..tables.columns import folded, number, text, words_in
 from ..tables.results import Results, counted, grouped, label, listed, most_often

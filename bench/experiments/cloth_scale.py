@@ -22,12 +22,12 @@ from plumbob.reference.sparse import CholeskyFactor
 from plumbob.reference.sparse.linear_solver import factorize
 
 from ..clock import compute_time_of
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.isolation import in_a_fresh_process
-from ..harness.progress import announce
-from ..harness.record import Record
-from ..harness.values import Floats1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.isolation import in_a_fresh_process
+from ..measure.progress import announce
+from ..measure.record import Record
+from ..measure.values import Floats1, Values
 from ..peers import catalogue
 
 # A frame [s], a stiff cloth [N/m], and the iterations of Liu et al. 2013.

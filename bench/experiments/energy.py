@@ -7,9 +7,9 @@ from typing import Any
 
 from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Floats1, Values
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Floats1, Values
 
 # Particles along a side, and the dampings of the springs [N s/m].
 SIZE = 5

@@ -14,9 +14,9 @@ from plumbob.reference import Outcome, Target, certify_ik, rotation, solve_ik
 from plumbob.reference.formats import urdf
 
 from ..clock import compute_time_of
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Booleans1, Floats1, Integers1, Values
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Booleans1, Floats1, Integers1, Values
 from ..problems.chains import unit
 from ..problems.evaluate import Targets, evaluator_of
 from ..problems.robot_targets import STRATA, farthest, robot_targets

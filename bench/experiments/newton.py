@@ -14,9 +14,9 @@ from plumbob.reference.arguments import FloatArray
 from plumbob.reference.implicit_euler.certificate import Certificate, certify
 from plumbob.reference.implicit_euler.objective import Objective
 
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Values
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Values
 from ..peers import catalogue
 from ..problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
 

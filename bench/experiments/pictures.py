@@ -8,10 +8,10 @@ import numpy as np
 
 from plumbob.reference import IK_SOLVERS, ImplicitEuler, rotation, scenes, track
 
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.record import Record
-from ..harness.values import Floats1, Floats2, Floats3, Integers1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.record import Record
+from ..measure.values import Floats1, Floats2, Floats3, Integers1, Values
 from ..problems.cloth_swing import TOLERANCE, H, cloth_swing, converged_motion, motion
 from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 
@@ -167,7 +167,7 @@ def converged_cloth() -> Measured:
 
 from ..figures.sketch import Sketch
 from ..figures.view import ARM_VIEW, CLOTH_VIEW, project
-from ..motion.motion import Moving, Scene
+from ..player.motion import Moving, Scene
 from ..tables.captions import Captions
 from ..tables.columns import text, words_in
 from ..tables.results import Results, counted, label, listed, solvers

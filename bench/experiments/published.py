@@ -10,11 +10,11 @@ import numpy as np
 
 from plumbob.reference import scenes, solve_ik
 
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.chain_targets import SolverLimits, blocks_of_users
-from ..harness.record import Record
-from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.chain_targets import SolverLimits, blocks_of_users
+from ..measure.record import Record
+from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.ik import toolbox, trac_ik
 from ..peers.peer import ONE_START, RESTARTS, Peer, Run

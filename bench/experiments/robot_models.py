@@ -10,10 +10,10 @@ import numpy as np
 from plumbob.reference import forward_kinematics, rotation
 from plumbob.reference.formats import mjcf, urdf
 
-from ..harness.block import Block, Measured, Scale
-from ..harness.isolation import Calculation, worker_process
-from ..harness.record import Record
-from ..harness.values import Values
+from ..measure.block import Block, Measured, Scale
+from ..measure.isolation import Calculation, worker_process
+from ..measure.record import Record
+from ..measure.values import Values
 from ..peers import catalogue
 from ..peers.catalogue import KINEMATICS
 from ..peers.peer import Peer

@@ -8,12 +8,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.progress import announce
-from ..harness.record import Record
-from ..harness.timing import attempt, restarted
-from ..harness.values import Booleans1, Floats1, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.progress import announce
+from ..measure.record import Record
+from ..measure.timing import attempt, restarted
+from ..measure.values import Booleans1, Floats1, Values
 from ..peers.catalogue import PLUMBOB, PLUMBOB_LM, TASK_SOLVERS
 from ..peers.peer import ONE_START, RESTARTS, Peer
 from ..problems.evaluate import evaluator_of

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from ..harness.block import Block, Group, Measured, Scale
-from ..harness.isolation import JobOutcome, Solved, raised
-from ..harness.measure import not_asked, not_installed
-from ..harness.progress import announce
-from ..harness.timing import Job, Times, answers, first_targets, times_in_turns
-from ..harness.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure.block import Block, Group, Measured, Scale
+from ..measure.isolation import JobOutcome, Solved, raised
+from ..measure.measure import not_asked, not_installed
+from ..measure.progress import announce
+from ..measure.timing import Job, Times, answers, first_targets, times_in_turns
+from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.peer import Peer, Run
 from ..peers.user_solver import ROBOT_TASK
@@ -345,9 +345,9 @@ from ..figures.chart import Panel, Series, series
 from ..figures.chart_sketch import declared_chart
 from ..figures.robot_map import draw_maps, robot_maps
 from ..figures.sketch import Sketch
-from ..harness import metrics
-from ..harness.metrics import Floats, Interval
-from ..harness.record import Record
+from ..measure import metrics
+from ..measure.metrics import Floats, Interval
+from ..measure.record import Record
 from ..peers.peer import (
     ONE_START,
     PORTFOLIO_ITERATIONS,

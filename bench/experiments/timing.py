@@ -18,12 +18,12 @@ import numpy as np
 from plumbob.reference import set_backend, set_num_threads
 
 from ..clock import pace
-from ..harness import metrics
-from ..harness.block import Block, Measured, Scale
-from ..harness.isolation import in_a_fresh_process
-from ..harness.progress import announce
-from ..harness.record import Record
-from ..harness.values import Floats2, Values
+from ..measure import metrics
+from ..measure.block import Block, Measured, Scale
+from ..measure.isolation import in_a_fresh_process
+from ..measure.progress import announce
+from ..measure.record import Record
+from ..measure.values import Floats2, Values
 from ..peers import catalogue
 from ..peers.protocol import describe
 

@@ -7,7 +7,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from ..harness.metrics import Share
+from ..measure.metrics import Share
 from ..peers import catalogue
 from ..tables.results import grouped
 from ..tables.table import Cell, Column, Table, best_cells, number_of, words

@@ -11,9 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..harness import metrics
-from ..harness.metrics import Floats, Ranking, Share
-from ..harness.record import FIRST_TARGETS, Record
+from ..measure import metrics
+from ..measure.metrics import Floats, Ranking, Share
+from ..measure.record import FIRST_TARGETS, Record
 from ..peers import catalogue
 from ..peers.peer import ONE_START, PORTFOLIO, RESTARTS
 from ..problems.robot_targets import seed_indices

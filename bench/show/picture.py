@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from ..figures.scene_drawing import COLOUR_MAP, draw_arm, draw_cloth
 from ..figures.style import COLOURS, PARAMETERS, plain_label
 from ..figures.view import project
-from ..motion.motion import Moving, Scene, decades, length
+from ..player.motion import Moving, Scene, decades, length
 
 # Moments of a picture.
 MOMENTS = 4

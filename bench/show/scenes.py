@@ -11,8 +11,8 @@ from plumbob.reference.arguments import FloatArray, choice
 from plumbob.reference.formats import bvh
 
 from ..figures.view import ARM_VIEW, CLOTH_VIEW
-from ..motion import motion
-from ..motion.motion import Moving, Scene
+from ..player import motion
+from ..player.motion import Moving, Scene
 from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING
 from ..tables.results import label
 from .scene_solver import ARM_TASKS, CLOTH_TASKS, H, SceneSolver

@@ -6,7 +6,7 @@ from pathlib import Path
 from string import Formatter
 from typing import Any
 
-from ..harness.record import Record
+from ..measure.record import Record
 from .layout import Layout, records_of
 from .results import Results, settings
 from .table import NO_SUMMARY, Summary, in_unit, words

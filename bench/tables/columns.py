@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ..harness import metrics
-from ..harness.record import Record
+from ..measure import metrics
+from ..measure.record import Record
 from .table import Cell, Column, in_unit, words
 
 # The names of the quantiles of a spread, in its order.

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..harness.record import Record
+from ..measure.record import Record
 from ..peers import catalogue
 from .columns import extent_in_words
 from .results import Results, settings

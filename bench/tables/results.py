@@ -9,8 +9,8 @@ from typing import Any, TypeVar
 
 from plumbob.text.printable import all_visible
 
-from ..harness.metrics import Ranking
-from ..harness.record import Record, on_record
+from ..measure.metrics import Ranking
+from ..measure.record import Record, on_record
 from ..peers import catalogue
 from .table import words
 

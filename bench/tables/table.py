@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
-from ..harness.metrics import Share
+from ..measure.metrics import Share
 
 Cell = str | int | float | bool | Share | None
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from ..harness.record import Record
+from ..measure.record import Record
 from .columns import text
 from .layout import Layout
 from .results import Results, grouped, listed

@@ -12,7 +12,7 @@ from markupsafe import Markup, escape
 
 from plumbob.text import html
 
-from ..harness.metrics import Share
+from ..measure.metrics import Share
 from .table import Cell, Column, Table, best_cells, words
 
 # A number with a power of ten, within a text.

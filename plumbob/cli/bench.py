@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from plumbob.bench.experiments import EXPERIMENTS, SUITES
-from plumbob.bench.harness.compile_ahead import compiling_ahead
-from plumbob.bench.harness.progress import TROUBLE, Progress, listening
+from plumbob.bench.measure.compile_ahead import compiling_ahead
+from plumbob.bench.measure.progress import TROUBLE, Progress, listening
 from plumbob.text.printable import visible
 
 from . import terminal
@@ -37,9 +37,9 @@ from .report import write_report
 from .verify import program_of
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.block import Choice
-    from plumbob.bench.harness.executors import Executor
-    from plumbob.bench.harness.run import Event
+    from plumbob.bench.measure.block import Choice
+    from plumbob.bench.measure.executors import Executor
+    from plumbob.bench.measure.run import Event
 
 QUICK, FULL = "quick", "full"
 TIMED_SUITES = {experiment.suite for experiment in EXPERIMENTS if experiment.times}
@@ -124,7 +124,7 @@ def _measure(
     verbose: bool,
 ) -> int:
     """Measure suites and print the answer, on request after every table."""
-    from plumbob.bench.harness.executors import executor_at
+    from plumbob.bench.measure.executors import executor_at
 
     writable(output)
     with closing(executor_at(address)) as place:
@@ -164,8 +164,8 @@ def run_suites(
 
     `before_times` is called before each block of a suite that measures times.
     """
-    from plumbob.bench.harness import run
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.measure import run
+    from plumbob.bench.measure.record import RecordFile
     from plumbob.reference.backend.compilation import numba_settings
 
     RecordFile(output).read()  # raises before anything is measured that could not be stored
@@ -199,8 +199,8 @@ def run_with_progress(
     before_times: Callable[[], object] = bool,
 ) -> "list[Event]":
     """Run suites with a progress bar, and return all events."""
-    from plumbob.bench.harness import run
-    from plumbob.bench.harness.executors import THIS_PROCESS
+    from plumbob.bench.measure import run
+    from plumbob.bench.measure.executors import THIS_PROCESS
 
     events: list[Event] = []
     with terminal.progress() as bar, terminal.lines_in_a_pipe(bar):
@@ -238,8 +238,8 @@ def _listener(bar: Any, task: Any, events: "Sequence[Event]") -> Callable[[Progr
 
 def _print_counts(events: "Sequence[Event]", output: Path) -> None:
     """Print how many blocks were measured, kept, measured again, and not run."""
-    from plumbob.bench.harness import run
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.measure import run
+    from plumbob.bench.measure.record import RecordFile
 
     counts = Counter(event.state for event in events)
     unchanged = visible(f"{counts[run.KEPT]:,} already on record in {output}")

@@ -26,8 +26,8 @@ from .options import (
 from .terminal import width
 
 if TYPE_CHECKING:
-    from plumbob.bench.comparison.compare import RunComparison
-    from plumbob.bench.harness.record import Record
+    from plumbob.bench.compare.compare import RunComparison
+    from plumbob.bench.measure.record import Record
 
 
 # What is measured of the user's solvers: two robots, targets of a chain, steps of a cloth.
@@ -67,7 +67,7 @@ def compare(  # noqa: PLR0913 -- one parameter an option
     --fail. Rows that are gone or have failed exceed every limit, except with gone:any. With --with,
     REV is a revision of your own repository, and --fail has default limits.
     """
-    from plumbob.bench.comparison import compare as comparison
+    from plumbob.bench.compare import compare as comparison
     from plumbob.bench.tables.writers import markdown as as_markdown
 
     paths = list(folders or [])
@@ -95,7 +95,7 @@ def compare(  # noqa: PLR0913 -- one parameter an option
 
 def _records(folder: Path) -> "list[Record]":
     """Return the records of a folder, or of the baseline of its name."""
-    from plumbob.bench.harness.record import on_record
+    from plumbob.bench.measure.record import on_record
 
     is_baseline = not folder.exists() and (BASELINES / folder).is_dir()
     return on_record(BASELINES / folder if is_baseline else folder, typed=False).records
@@ -103,8 +103,8 @@ def _records(folder: Path) -> "list[Record]":
 
 def _save(name: str, folders: list[Path]) -> int:
     """Keep the records of a folder as a baseline, in place of one of the same name."""
-    from plumbob.bench.harness.folder_lock import locked
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.measure.folder_lock import locked
+    from plumbob.bench.measure.record import RecordFile
 
     if not is_name(name) or name == ".." or name[0] == "-" or Path(name).name != name:
         expectation = "a name without folders or control characters"
@@ -124,7 +124,7 @@ def _save(name: str, folders: list[Path]) -> int:
 def _side_by_side(
     revision: str, solvers: list[str], suites: list[str], words: list[str], pairs: int
 ) -> "RunComparison":
-    from plumbob.bench.comparison.rerun import Plan, rerun
+    from plumbob.bench.compare.rerun import Plan, rerun
     from plumbob.bench.experiments import SUITES
 
     names = suites or (["ik", "cloth"] if solvers else ["timing"])

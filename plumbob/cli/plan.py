@@ -11,11 +11,11 @@ from statistics import median
 from typing import Any, NamedTuple
 
 from plumbob.bench.experiments import SUITES, blocks
-from plumbob.bench.harness import run
-from plumbob.bench.harness.block import Block, Choice
-from plumbob.bench.harness.executors import THIS_PROCESS
-from plumbob.bench.harness.measure import block_key, not_asked, not_installed
-from plumbob.bench.harness.record import Key, Record, RecordFile
+from plumbob.bench.measure import run
+from plumbob.bench.measure.block import Block, Choice
+from plumbob.bench.measure.executors import THIS_PROCESS
+from plumbob.bench.measure.measure import block_key, not_asked, not_installed
+from plumbob.bench.measure.record import Key, Record, RecordFile
 from plumbob.bench.peers import catalogue, packages
 from plumbob.bench.tables.results import counted, grouped
 

@@ -10,7 +10,7 @@ from .help_text import Command, FittingGroup, epilog
 from .options import REPORT, SUCCESS, Texts, argument, flag, option
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.record import Key, Record
+    from plumbob.bench.measure.record import Key, Record
     from plumbob.bench.tables.table import Table
 
 app = typer.Typer(cls=FittingGroup, rich_markup_mode=None)
@@ -43,7 +43,7 @@ def list_records(
     superseded: Superseded = False,
 ) -> int:
     """Count the records by suite and solver, and list the machines."""
-    from plumbob.bench.harness.record import FINISHED
+    from plumbob.bench.measure.record import FINISHED
     from plumbob.bench.tables.results import printable
 
     from .terminal import print_aligned
@@ -63,8 +63,8 @@ def merge(
 
     A failed measurement never replaces a successful one. The folders are not changed.
     """
-    from plumbob.bench.harness.folder_lock import locked
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.measure.folder_lock import locked
+    from plumbob.bench.measure.record import RecordFile
     from plumbob.process.paths import check_folder
 
     candidates = [record for folder in folders for record in _read(folder)]
@@ -101,8 +101,8 @@ def drop(
     ] = False,
 ) -> int:
     """Delete the records that match all options, permanently."""
-    from plumbob.bench.harness.folder_lock import locked
-    from plumbob.bench.harness.record import RecordFile
+    from plumbob.bench.measure.folder_lock import locked
+    from plumbob.bench.measure.record import RecordFile
 
     if not (suites or solvers or problems or failed or superseded):
         raise ValueError("drop: expected --suite, --solver, --problem, --failed or --superseded")
@@ -116,7 +116,7 @@ def drop(
 
 
 def _read(folder: Path) -> "list[Record]":
-    from plumbob.bench.harness.record import on_record
+    from plumbob.bench.measure.record import on_record
 
     return on_record(folder, typed=False).records
 

@@ -57,7 +57,7 @@ def report(
 
 def write_report(output: Path) -> int:
     """Write the report and print its summary."""
-    from plumbob.bench.report.report import write
+    from plumbob.bench.page.report import write
 
     print_outcome(write(output))
     return SUCCESS
@@ -65,7 +65,7 @@ def write_report(output: Path) -> int:
 
 def _tables(folder: Path) -> list["Table"]:
     """Return the tables of a folder's records."""
-    from plumbob.bench.report.sections import tables
+    from plumbob.bench.page.sections import tables
     from plumbob.bench.tables.results import results_of
 
     return tables(results_of(folder)[0])

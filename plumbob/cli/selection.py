@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from plumbob.bench.experiments import SCALES, blocks
 from plumbob.bench.experiments.published import TOOLBOX, TRAC_IK
-from plumbob.bench.harness.block import Block, Choice, Scale
+from plumbob.bench.measure.block import Block, Choice, Scale
 from plumbob.bench.peers import catalogue, opening
 from plumbob.bench.peers.user_solver import UserSolver
 from plumbob.bench.problems import files

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from plumbob.bench.report.report import BenchReport
+    from plumbob.bench.page.report import BenchReport
     from plumbob.bench.tables.results import Results
     from plumbob.bench.tables.table import Table
     from plumbob.crosscheck.verdict import ClaimVerdict
@@ -27,7 +27,7 @@ def width() -> int:
 
 def print_tables(suites: Sequence[str], output: Path) -> None:
     """Print the tables of these suites that have numbers."""
-    from plumbob.bench.report.sections import tables
+    from plumbob.bench.page.sections import tables
     from plumbob.bench.tables.table import is_blank
 
     for table in tables(_results(suites, output), suites):
@@ -37,13 +37,13 @@ def print_tables(suites: Sequence[str], output: Path) -> None:
 
 def print_ending(suites: Sequence[str], output: Path) -> None:
     """Print the summary of a bench of these suites, in about eight lines."""
-    from plumbob.bench.report.outcome import ending
+    from plumbob.bench.page.outcome import ending
 
     print("\n".join(ending(_results(suites, output), suites, width())))
 
 
 def _results(suites: Sequence[str], output: Path) -> "Results":
-    from plumbob.bench.harness.record import FINISHED, RecordFile
+    from plumbob.bench.measure.record import FINISHED, RecordFile
     from plumbob.bench.tables.results import Results
 
     records = RecordFile(output).read().records
@@ -87,14 +87,14 @@ def print_lines(table: "Table") -> list[str]:
 
 def print_outcome(report: "BenchReport") -> None:
     """Print the summary of a report, in ten lines."""
-    from plumbob.bench.report.outcome import outcome
+    from plumbob.bench.page.outcome import outcome
 
     print("\n".join(outcome(report, width())), flush=True)
 
 
 def print_verdicts(verdicts: Sequence["ClaimVerdict"]) -> None:
     """Print a row for each claim, the reasons of missed claims, and how many hold."""
-    from plumbob.bench.harness.metrics import ratio
+    from plumbob.bench.measure.metrics import ratio
     from plumbob.bench.tables.table import Column, Table, cells
 
     def used(v: "ClaimVerdict") -> float | None:

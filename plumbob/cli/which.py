@@ -12,7 +12,7 @@ from .report import FORMATS, formatted
 from .terminal import print_filled, print_lines
 
 if TYPE_CHECKING:
-    from plumbob.bench.harness.block import Choice
+    from plumbob.bench.measure.block import Choice
 
 SUFFIXES = (".urdf", ".xml", ".mjcf")
 
@@ -31,8 +31,8 @@ def which(
     All solve the same 60 poses within 1 mm, 1 mrad and the limits of the joints. Your robot must
     have only hinges from its root to the link.
     """
-    from plumbob.bench.harness.record import on_record
-    from plumbob.bench.report.which import solvers_on_robot
+    from plumbob.bench.measure.record import on_record
+    from plumbob.bench.page.which import solvers_on_robot
     from plumbob.bench.tables.results import Results
 
     if form:
@@ -58,7 +58,7 @@ def _choice(robot: Path, link: str | None, user_solvers: Sequence[str]) -> "Choi
         ValueError: if the file is none of a robot, the bench cannot take the robot, or a solver of
             the user cannot be opened or takes no robots.
     """
-    from plumbob.bench.harness.block import SCALES, Choice
+    from plumbob.bench.measure.block import SCALES, Choice
     from plumbob.bench.peers import opening
     from plumbob.bench.peers.user_solver import ROBOT_TASK
     from plumbob.bench.problems.files import read

@@ -12,8 +12,8 @@ import pytest
 
 from plumbob.bench.experiments import SUITES
 from plumbob.bench.figures import canvas
-from plumbob.bench.harness.isolation import WorkerProcess
-from plumbob.bench.harness.record import FINISHED, Record
+from plumbob.bench.measure.isolation import WorkerProcess
+from plumbob.bench.measure.record import FINISHED, Record
 from plumbob.bench.problems.robots import group_of
 
 SAMPLES = tomllib.loads(Path(__file__).with_name("records.toml").read_text(encoding="utf-8"))

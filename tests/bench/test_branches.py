@@ -4,7 +4,7 @@ import pytest
 from table_cells import column
 
 from plumbob.bench.experiments.branches import blocks, branches, lists
-from plumbob.bench.harness.block import Scale
+from plumbob.bench.measure.block import Scale
 from plumbob.bench.problems.robots import is_installed
 from plumbob.bench.tables.results import Results
 

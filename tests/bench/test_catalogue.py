@@ -13,13 +13,13 @@ import plumbob.bench.experiments
 from plumbob.bench.experiments import Scale, blocks, cloth, newton
 from plumbob.bench.experiments import robots as robot_tables
 from plumbob.bench.figures.style import COLOURS
-from plumbob.bench.harness import run, timing
-from plumbob.bench.harness.experiment import Experiment
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure import run, timing
+from plumbob.bench.measure.experiment import Experiment
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page.sections import tables
 from plumbob.bench.peers import catalogue, ik, packages
 from plumbob.bench.peers.peer import ONE_START
 from plumbob.bench.problems.cloth_swing import cloth_swing
-from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.reference import STEP_SOLVERS
 from plumbob.reference.implicit_euler.local_global import LocalGlobal
@@ -89,8 +89,8 @@ def test_a_new_peer_is_a_file_and_stands_in_the_tables(tmp_path, monkeypatch, in
 
 
 EXPERIMENT = """
-from plumbob.bench.harness.block import Block
-from plumbob.bench.harness.values import Values
+from plumbob.bench.measure.block import Block
+from plumbob.bench.measure.values import Values
 
 class Sum(Values, frozen=True):
     sum: int
@@ -201,7 +201,7 @@ def test_the_command_that_adds_peers_fits_how_plumbob_was_installed(monkeypatch,
 
 LOADS = """
 import sys
-from plumbob.bench.harness import isolation
+from plumbob.bench.measure import isolation
 from plumbob.bench.peers import catalogue, ik, packages
 from plumbob.verify import verify
 

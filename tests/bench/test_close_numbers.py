@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from table_cells import column
 
-from plumbob.bench.comparison.answers import compare_answers
-from plumbob.bench.comparison.rows import Pair, row_key
+from plumbob.bench.compare.answers import compare_answers
+from plumbob.bench.compare.rows import Pair, row_key
 from plumbob.bench.experiments import check
 from plumbob.bench.tables.results import Results
 from plumbob.reference import Skeleton, arguments

@@ -19,7 +19,7 @@ from plumbob.bench.experiments.cloth_peers import (
     motion_rungs,
     step_rungs,
 )
-from plumbob.bench.harness.isolation import JobOutcome, WorkerProcess
+from plumbob.bench.measure.isolation import JobOutcome, WorkerProcess
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import EXPLICIT, LINEARISED, Peer, Run
 from plumbob.bench.problems import cloth_truth as truth

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import cloth_scale as suite
-from plumbob.bench.harness.block import Scale
-from plumbob.bench.harness.progress import listening
+from plumbob.bench.measure.block import Scale
+from plumbob.bench.measure.progress import listening
 from plumbob.bench.tables.results import Results
 from plumbob.reference.implicit_euler.objective import Objective
 

@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plumbob.bench.comparison import compare as comparing
-from plumbob.bench.comparison import times
-from plumbob.bench.comparison.compare import compare, failing, gate_limits
-from plumbob.bench.comparison.rows import ORDER, ChangeVerdict, Pair, TimeRatio, by_row
-from plumbob.bench.harness import metrics
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.compare import compare as comparing
+from plumbob.bench.compare import times
+from plumbob.bench.compare.compare import compare, failing, gate_limits
+from plumbob.bench.compare.rows import ORDER, ChangeVerdict, Pair, TimeRatio, by_row
+from plumbob.bench.measure import metrics
+from plumbob.bench.measure.record import RecordFile
 from plumbob.cli import main as cli
 
 KEY = ("timing", "p", "mine", "{}")

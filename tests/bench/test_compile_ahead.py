@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from plumbob.bench.harness import compile_ahead
+from plumbob.bench.measure import compile_ahead
 
 FIRST_SOLVES = """
 from plumbob import ImplicitEuler, scenes, solve_ik

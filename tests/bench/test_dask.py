@@ -16,14 +16,14 @@ from pathlib import Path
 import pytest
 
 from plumbob.bench.experiments import EXPERIMENTS, SCALES, Block, Scale, blocks
-from plumbob.bench.harness import run
-from plumbob.bench.harness.executors import dask, executor_at
-from plumbob.bench.harness.machine import measuring_part, stamp
-from plumbob.bench.harness.measure import block_key
-from plumbob.bench.harness.record import Record, RecordFile, decode
+from plumbob.bench.measure import run
+from plumbob.bench.measure.executors import dask, executor_at
+from plumbob.bench.measure.machine import measuring_part, stamp
+from plumbob.bench.measure.measure import block_key
+from plumbob.bench.measure.record import Record, RecordFile, decode
+from plumbob.bench.page.sections import tables
 from plumbob.bench.peers.sources import digest_of
 from plumbob.bench.peers.user_solver import UserSolver
-from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown
 from plumbob.cli import main as cli
@@ -133,7 +133,7 @@ def test_another_server_at_the_address_is_misuse(name):
             ends.callback(thread.join)
             ends.callback(server.shutdown, socket.SHUT_RDWR)  # closing does not end its wait
         program = (
-            "from plumbob.bench.harness.executors.dask import DaskExecutor\n"
+            "from plumbob.bench.measure.executors.dask import DaskExecutor\n"
             f"try: DaskExecutor('{address}', answer=0.5)\n"
             "except ValueError as error: print(error)"
         )

@@ -18,7 +18,7 @@ from plumbob.bench.experiments.arm import accuracy
 from plumbob.bench.experiments.chain import beyond_reach, rivals
 from plumbob.bench.experiments.closed_curves import jitter
 from plumbob.bench.experiments.cloth_peers import SOLVED
-from plumbob.bench.report.sections import SECTIONS, tables
+from plumbob.bench.page.sections import SECTIONS, tables
 from plumbob.bench.tables.latex import escaped
 from plumbob.bench.tables.results import Results, label
 from plumbob.bench.tables.table import best_cells, words

@@ -14,8 +14,7 @@ from plumbob.bench.figures.canvas import pdf_of  # before its stand-in is in pla
 from plumbob.bench.figures.chart import LOOKS, MAX_LABELLED, Axis, Chart, Panel, looks, series
 from plumbob.bench.figures.chart_sketch import chart_sketch
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.report import report
-from plumbob.bench.report.page import page
+from plumbob.bench.page import page, report
 from plumbob.bench.tables.results import Results
 
 OURS = "Plumbob LM, first phase"

@@ -28,17 +28,17 @@ def test_only_the_clock_and_the_harness_read_a_clock():
     # PlaCo lives in an environment of its own, where nothing of ours is: it times itself.
     allowed = {"clock.py", "peers/placo_program.py"}
     # When and in how long a record was made; rounds of a call by Python's own timer.
-    allowed |= {"harness/measure.py", "harness/run.py", "experiments/timing.py"}
+    allowed |= {"measure/measure.py", "measure/run.py", "experiments/timing.py"}
     assert readers == allowed
 
 
 def test_only_record_names_the_result_file():
     namers = {name(path) for path in SOURCES if ".jsonl" in path.read_text(encoding="utf-8")}
     # The results of the search over settings are no records.
-    assert namers == {"harness/record.py"}
+    assert namers == {"measure/record.py"}
 
 
-SHOWS = ["tables/table.py", "report/report.py", "experiments/chain.py"]
+SHOWS = ["tables/table.py", "page/report.py", "experiments/chain.py"]
 
 
 @pytest.mark.parametrize("file", SHOWS)

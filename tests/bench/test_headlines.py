@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments import timing
-from plumbob.bench.harness import metrics
-from plumbob.bench.harness.record import FINISHED
+from plumbob.bench.measure import metrics
+from plumbob.bench.measure.record import FINISHED
+from plumbob.bench.page import headlines
+from plumbob.bench.page.standings import in_percent
 from plumbob.bench.peers import catalogue
 from plumbob.bench.ranking.scores import STARTS, overall
-from plumbob.bench.report import headlines
-from plumbob.bench.report.standings import in_percent
 from plumbob.bench.tables.layout import source
 from plumbob.bench.tables.results import Results
 

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 from hostile_programs import LIMITS, running
 
-from plumbob.bench.harness import chain_targets as chain
-from plumbob.bench.harness import timing
-from plumbob.bench.harness.isolation import WorkerProcess
-from plumbob.bench.harness.progress import TROUBLE, listening
+from plumbob.bench.measure import chain_targets as chain
+from plumbob.bench.measure import timing
+from plumbob.bench.measure.isolation import WorkerProcess
+from plumbob.bench.measure.progress import TROUBLE, listening
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.protocol import NoAnswerError
 from plumbob.bench.peers.user_solver import UserSolver

@@ -5,10 +5,10 @@ import pytest
 
 from plumbob.bench.experiments import Scale, robots
 from plumbob.bench.experiments.robots import outcomes, robot_by_robot
-from plumbob.bench.harness import timing
-from plumbob.bench.harness.isolation import Finished, Solved, WorkerProcess, raised
-from plumbob.bench.harness.measure import record_of
-from plumbob.bench.harness.timing import Job, restarted, times_in_turns
+from plumbob.bench.measure import timing
+from plumbob.bench.measure.isolation import Finished, Solved, WorkerProcess, raised
+from plumbob.bench.measure.measure import record_of
+from plumbob.bench.measure.timing import Job, restarted, times_in_turns
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import ONE_START, Peer, Run
 from plumbob.bench.peers.protocol import OwnTime, SolverOutput

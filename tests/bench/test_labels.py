@@ -7,9 +7,9 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from plumbob.bench.figures.drawing import power, ticks
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import report
 from plumbob.bench.peers import catalogue
-from plumbob.bench.report import report
 
 WIDTHS = (1440, 390)
 DOCS = Path(__file__).parents[2] / "docs"

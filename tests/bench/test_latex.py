@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plumbob.bench.harness.metrics import share
-from plumbob.bench.report import sections
+from plumbob.bench.measure.metrics import share
+from plumbob.bench.page import sections
 from plumbob.bench.tables.latex import escaped, latex
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table

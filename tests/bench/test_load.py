@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 
-from plumbob.bench.comparison.answers import is_time
+from plumbob.bench.compare.answers import is_time
 from plumbob.bench.experiments import Scale
-from plumbob.bench.harness import run
-from plumbob.bench.harness.block import Choice
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure import run
+from plumbob.bench.measure.block import Choice
+from plumbob.bench.measure.record import RecordFile
 from plumbob.bench.ranking.scores import STARTS, overall
 from plumbob.bench.tables.results import Results
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.harness import machine
+from plumbob.bench.measure import machine
 
 PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 ROOT = Path(machine.__file__).resolve().parents[2]
@@ -146,18 +146,18 @@ def test_measurements_never_import_presentation():
 @pytest.mark.parametrize(
     "line",
     [
-        "import plumbob.bench.report.report",
+        "import plumbob.bench.page.report",
         "from ..report import sections",
-        "from plumbob.bench.report import sections",
+        "from plumbob.bench.page import sections",
         "def f():\n    from ..tables.results import label",
         'importlib.import_module("plumbob.bench.tables.results")',
     ],
 )
 def test_an_import_of_presentation_is_found(tmp_path, monkeypatch, line):
-    path = tmp_path / "bench" / "harness" / "metrics.py"
+    path = tmp_path / "bench" / "measure" / "metrics.py"
     path.parent.mkdir(parents=True)
     path.write_text(line)
-    for name in ("report/report.py", "report/sections.py", "tables/results.py"):
+    for name in ("page/report.py", "page/sections.py", "tables/results.py"):
         (tmp_path / "bench" / name).parent.mkdir(exist_ok=True)
         (tmp_path / "bench" / name).touch()
     monkeypatch.setattr(sys.modules[__name__], "ROOT", tmp_path)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from plumbob.bench.harness import metrics
+from plumbob.bench.measure import metrics
 from plumbob.bench.problems.cloth_truth import rms_distance
 
 

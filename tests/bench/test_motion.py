@@ -9,10 +9,10 @@ import pytest
 from browser import CHROMIUM, Browser
 
 from plumbob.bench.experiments.pictures import arm_motion, cloth_motion
-from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.motion import motion
-from plumbob.bench.motion.motion import Moving, Scene, data_of
-from plumbob.bench.report import report
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import report
+from plumbob.bench.player import motion
+from plumbob.bench.player.motion import Moving, Scene, data_of
 from plumbob.bench.tables.results import Results
 
 KILOBYTE = 1024

@@ -13,11 +13,11 @@ from plumbob.bench.experiments import SCALES, SUITES, blocks
 from plumbob.bench.experiments.arm import accuracy, residuals_chart
 from plumbob.bench.experiments.chain import beyond_reach, iterations_chart
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page.headlines import absent
+from plumbob.bench.page.sections import tables
 from plumbob.bench.peers import opening
 from plumbob.bench.peers.peer import Peer
-from plumbob.bench.report.headlines import absent
-from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
 from plumbob.bench.tables.table import words
 from plumbob.bench.tables.user_solvers import solver_remarks

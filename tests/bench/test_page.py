@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
 
-from plumbob.bench.harness.record import FINISHED, RecordFile
-from plumbob.bench.motion import motion
+from plumbob.bench.measure.record import FINISHED, RecordFile
+from plumbob.bench.page import page as pages
+from plumbob.bench.page import report
+from plumbob.bench.page.sections import SECTIONS
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import ONE_START
-from plumbob.bench.report import report
-from plumbob.bench.report.page import page as pages
-from plumbob.bench.report.sections import SECTIONS
+from plumbob.bench.player import motion
 
 DESK, PHONE = (1440, 900), (390, 844)
 ROBOTS = ("Panda", "UR5", "xArm7", "PR2", "Atlas")

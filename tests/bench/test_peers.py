@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from plumbob.bench import clock
-from plumbob.bench.harness.isolation import Solved
-from plumbob.bench.harness.timing import Job, restarted
+from plumbob.bench.measure.isolation import Solved
+from plumbob.bench.measure.timing import Job, restarted
 from plumbob.bench.peers import protocol
 from plumbob.bench.peers.catalogue import PEERS, PLUMBOB_LM
 from plumbob.bench.peers.ik import placo

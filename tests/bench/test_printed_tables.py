@@ -8,8 +8,8 @@ import numpy as np
 import printed_table
 import pytest
 
-from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.report import sections
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import sections
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import is_blank, without_empty, words
 from plumbob.cli import main as cli

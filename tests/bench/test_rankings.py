@@ -10,11 +10,11 @@ from table_cells import by_solver
 from plumbob.bench.experiments import timing
 from plumbob.bench.experiments.robots import MEAN, budgets, over_all, robot_by_robot
 from plumbob.bench.figures.robot_map import SOLVED, TIME, robot_maps
+from plumbob.bench.page import headlines
+from plumbob.bench.page.page_tables import page_table
+from plumbob.bench.page.sections import SECTIONS
+from plumbob.bench.page.wins import wins_in
 from plumbob.bench.ranking.rankings import rankings
-from plumbob.bench.report import headlines
-from plumbob.bench.report.page.page_tables import page_table
-from plumbob.bench.report.sections import SECTIONS
-from plumbob.bench.report.wins import wins_in
 from plumbob.bench.tables.layout import provenance
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import percent, words

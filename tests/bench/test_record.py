@@ -13,9 +13,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from plumbob.bench.harness.block import Block
-from plumbob.bench.harness.measure import measure, record_of
-from plumbob.bench.harness.record import FILE_NAME, Record, RecordFile, decode, encode, key, untyped
+from plumbob.bench.measure.block import Block
+from plumbob.bench.measure.measure import measure, record_of
+from plumbob.bench.measure.record import FILE_NAME, Record, RecordFile, decode, encode, key, untyped
 
 ANY_FLOATS = arrays.arrays(
     np.float64, arrays.array_shapes(max_dims=3), elements=st.floats(allow_nan=True)

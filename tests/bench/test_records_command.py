@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from plumbob.bench.harness.folder_lock import locked
-from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.bench.measure.folder_lock import locked
+from plumbob.bench.measure.record import RecordFile, encode
 from plumbob.cli import main as cli
 
 

@@ -12,10 +12,10 @@ import pytest
 from html_page import Page
 
 from plumbob.bench.experiments import SUITES
-from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.harness.values import words_of
-from plumbob.bench.report import report
-from plumbob.bench.report.sections import SECTIONS
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.measure.values import words_of
+from plumbob.bench.page import report
+from plumbob.bench.page.sections import SECTIONS
 from plumbob.bench.tables.results import Results, results_of
 
 

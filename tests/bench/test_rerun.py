@@ -16,10 +16,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from plumbob.bench.comparison import rerun as rerunning
-from plumbob.bench.comparison.rerun import PREFIX, Plan, _temporary_folder, rerun
-from plumbob.bench.comparison.rows import ChangeVerdict, Pair, TimeRatio, row_key
-from plumbob.bench.comparison.times import time_change
+from plumbob.bench.compare import rerun as rerunning
+from plumbob.bench.compare.rerun import PREFIX, Plan, _temporary_folder, rerun
+from plumbob.bench.compare.rows import ChangeVerdict, Pair, TimeRatio, row_key
+from plumbob.bench.compare.times import time_change
 from plumbob.cli import main as cli
 
 KEY = ("timing", "p", "mine", "{}")

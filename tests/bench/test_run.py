@@ -11,10 +11,10 @@ import pytest
 
 from plumbob import bench
 from plumbob.bench.experiments import Block
-from plumbob.bench.harness import machine, run
-from plumbob.bench.harness.folder_lock import locked
-from plumbob.bench.harness.machine import stamp
-from plumbob.bench.harness.record import RecordFile, encode
+from plumbob.bench.measure import machine, run
+from plumbob.bench.measure.folder_lock import locked
+from plumbob.bench.measure.machine import stamp
+from plumbob.bench.measure.record import RecordFile, encode
 from plumbob.bench.tables.results import Results
 
 ROOT = Path(bench.__file__).resolve().parents[1]
@@ -234,7 +234,7 @@ def test_two_runs_into_one_folder_exclude_each_other(suite, tmp_path):
 
 def test_a_lock_is_free_once_its_process_was_killed(tmp_path):
     script = (
-        "import sys, time; from plumbob.bench.harness.folder_lock import locked\n"
+        "import sys, time; from plumbob.bench.measure.folder_lock import locked\n"
         "with locked(sys.argv[1]): print('locked', flush=True); time.sleep(60)"
     )
     command = [sys.executable, "-c", script, str(tmp_path)]

@@ -3,7 +3,7 @@
 import pytest
 import write_sample as sample
 
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure.record import RecordFile
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from html_page import Page
 
-from plumbob.bench.harness.metrics import Share, share
-from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.report import sections
+from plumbob.bench.measure.metrics import Share, share
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import sections
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.selection import column_numbers, selected
 from plumbob.bench.tables.table import NO_SUMMARY, Column, Summary, Table, best_cells, words

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from plumbob.bench.motion import motion
+from plumbob.bench.player import motion
 from plumbob.bench.show import scenes as shows
 from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.cli import main as cli

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from plumbob.bench.experiments.chain import CHAIN, beyond_reach
-from plumbob.bench.harness.chain_targets import (
+from plumbob.bench.measure.chain_targets import (
     SolverLimits,
     job_of,
     solve_one_by_one,
     solve_targets,
 )
-from plumbob.bench.harness.record import Record
+from plumbob.bench.measure.record import Record
 from plumbob.bench.peers import chain_loops
 from plumbob.bench.peers.levenberg_marquardt import (
     ReferenceKinematics,

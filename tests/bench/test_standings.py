@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import outcome, report
+from plumbob.bench.page.sections import tables
+from plumbob.bench.page.standings import MAX_CLOTHS, standings
 from plumbob.bench.peers import opening
-from plumbob.bench.report import outcome, report
-from plumbob.bench.report.sections import tables
-from plumbob.bench.report.standings import MAX_CLOTHS, standings
 from plumbob.bench.tables.results import Results
 from plumbob.cli import terminal
 from plumbob.cli.main import run_command
@@ -279,7 +279,7 @@ def test_a_first_exception_is_printed_at_once_and_then_how_often(tmp_path, monke
 
 
 def test_what_fails_alike_is_said_once_and_counted(tmp_path, monkeypatch, capsys):
-    from plumbob.bench.harness import run
+    from plumbob.bench.measure import run
     from plumbob.cli.bench import run_suites
 
     why = {"chain/near": "It raised", "chain/far": "It raised", "robots/all": "It crashed"}

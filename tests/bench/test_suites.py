@@ -9,11 +9,11 @@ import pytest
 
 from plumbob.bench.experiments import SUITES, Scale, blocks, cloth
 from plumbob.bench.experiments.cloth import ONE_STEP, convergence
-from plumbob.bench.harness.block import Block
-from plumbob.bench.harness.machine import stamp
-from plumbob.bench.harness.measure import measure
-from plumbob.bench.harness.record import Record, decode, encode, key
-from plumbob.bench.harness.run import now
+from plumbob.bench.measure.block import Block
+from plumbob.bench.measure.machine import stamp
+from plumbob.bench.measure.measure import measure
+from plumbob.bench.measure.record import Record, decode, encode, key
+from plumbob.bench.measure.run import now
 from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.writers import markdown

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure.record import RecordFile
 from plumbob.cli import main as cli
 
 PAGE = Path(__file__).parents[2] / "docs" / "tables.md"

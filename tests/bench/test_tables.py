@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from plumbob.bench.harness.metrics import Share, share
-from plumbob.bench.report.sections import SECTIONS
+from plumbob.bench.measure.metrics import Share, share
+from plumbob.bench.page.sections import SECTIONS
 from plumbob.bench.tables import writers
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Summary, Table, best_cells, words

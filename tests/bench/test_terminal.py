@@ -10,9 +10,9 @@ import pytest
 from rich.cells import cell_len
 from rich.console import Console
 
-from plumbob.bench.harness.record import RecordFile
-from plumbob.bench.report import outcome, report, sections
-from plumbob.bench.report.headlines import ClaimCount, Headline, Overview
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page import outcome, report, sections
+from plumbob.bench.page.headlines import ClaimCount, Headline, Overview
 from plumbob.bench.tables import aligned
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Table, naming, without_empty, words

@@ -24,9 +24,9 @@ from plumbob.bench.experiments.timing import (
     TimedWork,
     cases,
 )
-from plumbob.bench.harness import run
-from plumbob.bench.harness.machine import stamp
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure import run
+from plumbob.bench.measure.machine import stamp
+from plumbob.bench.measure.record import RecordFile
 from plumbob.bench.peers import catalogue
 from plumbob.bench.problems.cloth_swing import cloth_swing
 from plumbob.bench.problems.robots import is_installed, robot

@@ -12,15 +12,15 @@ from plumbob.bench.experiments.arm import residuals_chart
 from plumbob.bench.experiments.chain import iterations_chart
 from plumbob.bench.experiments.cloth_peers import truth_chart
 from plumbob.bench.figures.sketch import drawn
-from plumbob.bench.harness import timing
-from plumbob.bench.harness.record import RecordFile
+from plumbob.bench.measure import timing
+from plumbob.bench.measure.record import RecordFile
+from plumbob.bench.page.sections import tables
 from plumbob.bench.peers import opening
 from plumbob.bench.peers.sources import commit_of, digest_of
 from plumbob.bench.peers.user_chain import joint_positions
 from plumbob.bench.problems import models
 from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
-from plumbob.bench.report.sections import tables
 from plumbob.bench.tables.results import Results, printable
 from plumbob.cli.main import run_command
 from plumbob.reference import Skeleton, forward_kinematics
@@ -142,7 +142,7 @@ def test_a_later_plain_run_keeps_records_of_entrants(folder, capsys, monkeypatch
     (before,) = records()
     assert not any(one.suite == "finished" for one in RecordFile("out").read().records)
     capsys.readouterr()
-    from plumbob.bench.harness import run  # what a plain run asks for, without measuring all of it
+    from plumbob.bench.measure import run  # what a plain run asks for, without measuring all of it
 
     few = [one for one in run.blocks("ik", run.SCALES["quick"]) if one.problem == "chain/near"][:2]
     monkeypatch.setattr(run, "blocks", lambda suite, scale: iter(few))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from plumbob.bench.page.which import solvers_on_robot
 from plumbob.bench.peers import catalogue, opening
 from plumbob.bench.peers.peer import RESTARTS
-from plumbob.bench.report.which import solvers_on_robot
 from plumbob.bench.tables.results import Results
 from plumbob.cli.main import run_command
 
@@ -93,7 +93,7 @@ def folder(tmp_path, monkeypatch, in_this_process):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(opening, "installed", list)
     monkeypatch.setattr(catalogue, "PEERS", catalogue.PEERS[:1])
-    monkeypatch.setattr("plumbob.bench.harness.timing.worker_process",
+    monkeypatch.setattr("plumbob.bench.measure.timing.worker_process",
                         in_this_process)  # fmt: skip
     for name, kind in (("arm", "revolute"), ("slider", "prismatic")):
         (tmp_path / f"{name}.urdf").write_text(ARM.format(kind=kind))

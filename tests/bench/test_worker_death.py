@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from plumbob.bench.harness import isolation
-from plumbob.bench.harness.isolation import Ready, WorkerProcess
+from plumbob.bench.measure import isolation
+from plumbob.bench.measure.isolation import Ready, WorkerProcess
 from plumbob.process.child import ChildProcess
 
 ROOT = Path(isolation.__file__).resolve().parents[2]
@@ -24,7 +24,7 @@ JOBS = """
 import ctypes, gc, os, pickle, signal, struct, subprocess, sys, time
 from multiprocessing.connection import Connection
 import numpy as np
-from plumbob.bench.harness.isolation import Finished, Ready, Solved
+from plumbob.bench.measure.isolation import Finished, Ready, Solved
 from plumbob.bench.peers.protocol import OwnTime
 
 def descriptor():
@@ -213,7 +213,7 @@ def test_nothing_is_left_running_not_even_a_child_of_the_solver(jobs, tmp_path, 
 def test_a_worker_and_its_child_end_with_the_program_that_started_it(jobs, tmp_path, end):
     script = (
         "import sys; import os; from pathlib import Path\n"
-        "from plumbob.bench.harness.isolation import WorkerProcess\n"
+        "from plumbob.bench.measure.isolation import WorkerProcess\n"
         "from dying_jobs import WithChild\n"
         f"next(WorkerProcess().stream(WithChild(sys.argv[1]))); {end}"
     )

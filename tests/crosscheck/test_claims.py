@@ -214,7 +214,7 @@ for name, claim in CLAIMS.items():
 def test_what_is_counted_as_resting_on_an_engine_cannot_be_checked_without_it():
     """Six claims were once said to hold against an engine, and rest on closed forms."""
     from plumbob.bench.experiments.check import verdicts
-    from plumbob.bench.harness.record import Record
+    from plumbob.bench.measure.record import Record
     from plumbob.bench.tables.results import Results
 
     command = [sys.executable, "-c", WITHOUT_ENGINES]

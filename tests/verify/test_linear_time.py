@@ -33,7 +33,7 @@ def read(text):
 from plumbob.crosscheck.robots.independent_bvh import global_poses
 read = lambda text: next(global_poses(text.decode()))
 """,
-    "record": "from plumbob.bench.harness.record import decode as read",
+    "record": "from plumbob.bench.measure.record import decode as read",
 }
 TEXTS = {
     "message": {

@@ -35,7 +35,7 @@ from plumbob.reference.jacobians import jacobian
 from plumbob.reference.kinematics import THREAD_JOINTS
 from plumbob.reference.sparse import CholeskyFactor
 
-from ...harness import metrics
+from ...measure import metrics
 from ...peers import catalogue
 from ...peers.levenberg_marquardt import ReferenceKinematics, levenberg_marquardt
 from ...problems.chains import chain_targets

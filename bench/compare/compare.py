@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from plumbob.text.printable import visible
 
-from ..harness.metrics import adjusted
-from ..harness.record import Record
+from ..measure.metrics import adjusted
+from ..measure.record import Record
 from ..tables.columns import text
 from ..tables.results import counted
 from ..tables.table import Summary, Table, cells

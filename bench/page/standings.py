@@ -7,8 +7,8 @@ import numpy as np
 
 from ..experiments import chain, cloth_peers
 from ..experiments.cloth_peers import Point, points
-from ..harness import metrics
-from ..harness.record import FIRST_TARGETS
+from ..measure import metrics
+from ..measure.record import FIRST_TARGETS
 from ..peers import catalogue
 from ..problems.chains import BEYOND
 from ..ranking import scores

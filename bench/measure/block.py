@@ -58,7 +58,7 @@ class Block:
     settings: Mapping[str, Any] = field(default_factory=dict)
     size: float = 0  # how much is measured, where that varies: targets, or seconds of a benchmark
     # the names as values: numbers, words, truth values and lists of words. "title" is the problem
-    # as written; "task" is the kind of its numbers, see `harness.values`.
+    # as written; "task" is the kind of its numbers, see `measure.values`.
     facts: Mapping[str, Any] = field(default_factory=dict)
     times: bool = True  # whether times are among the numbers, or end the work: see `Experiment`
     # of its solver, beside the conditions of every record

@@ -9,12 +9,12 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
-from ...figures.sketch import Drawing
-from ...harness.metrics import Share
-from ...tables.columns import extent_in_words
-from ...tables.results import label
-from ...tables.table import Cell, Source, Table, best_cells, decimals, number_of, words
-from ...tables.writers import POWER, csv_names
+from ..figures.sketch import Drawing
+from ..measure.metrics import Share
+from ..tables.columns import extent_in_words
+from ..tables.results import label
+from ..tables.table import Cell, Source, Table, best_cells, decimals, number_of, words
+from ..tables.writers import POWER, csv_names
 
 # The column replaced by the page's switch between one start and restarts.
 STARTS = "starts"

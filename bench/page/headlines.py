@@ -21,8 +21,8 @@ from ..experiments.cloth_peers import (
     motion_length,
     points,
 )
-from ..harness import metrics
-from ..harness.record import FINISHED
+from ..measure import metrics
+from ..measure.record import FINISHED
 from ..peers import catalogue
 from ..peers.peer import ONE_START, PORTFOLIO, PORTFOLIO_ITERATIONS, RESTARTS
 from ..problems.robots import REACHABLE

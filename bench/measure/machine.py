@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _PACKAGES = ("reference", "crosscheck", "verify", "bench", "plumbob/process")
 # Folders that only show numbers, never imported by a measurement; others may change a number.
 PRESENTATION = (
-    *("bench/comparison", "bench/figures", "bench/motion", "bench/report", "bench/show"),
+    *("bench/compare", "bench/figures", "bench/page", "bench/player", "bench/show"),
     *("bench/ranking", "bench/tables", "verify/screen"),
 )
 # The line of an experiment's file above which it measures, and below which it only shows numbers.

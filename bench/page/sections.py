@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 from ..experiments import EXPERIMENTS
 from ..experiments.pictures import arm_motion, cloth_motion
-from ..harness.experiment import Experiment
-from ..motion.motion import Scene
+from ..measure.experiment import Experiment
+from ..player.motion import Scene
 from ..tables.layout import Layout
 from ..tables.results import Results
 from ..tables.table import Table

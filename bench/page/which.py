@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from ..harness import metrics
+from ..measure import metrics
 from ..peers import catalogue, packages
 from ..problems.robots import REACHABLE
 from ..ranking.scores import Score, by_robot

@@ -3,7 +3,7 @@
 import math
 from typing import NamedTuple
 
-from ...tables.table import number_of, words
+from ..tables.table import number_of, words
 from .page_tables import PageTable
 
 # Decades of the strip of claims, and the width of a dot [%].

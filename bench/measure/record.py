@@ -89,7 +89,7 @@ class Record:
     # target, frame or step; "failed" says why there are no numbers
     measured: Mapping[str, Any] = field(default_factory=dict)
     size: float = 0.0  # how much was measured, for example the number of random targets
-    # machine, versions and digest of the sources, see `plumbob.bench.harness.machine`
+    # machine, versions and digest of the sources, see `plumbob.bench.measure.machine`
     stamp: Mapping[str, Any] = field(default_factory=dict)
     when: str = ""  # the moment it was produced, ISO 8601 with time zone
     seconds: float = 0.0  # how long it took to produce

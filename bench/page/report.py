@@ -10,7 +10,7 @@ from plumbob.text.printable import shortened, visible
 from ..experiments import SUITES
 from ..figures.robot_map import robot_maps
 from ..figures.sketch import Drawing, drawn
-from ..harness.record import FINISHED, Record
+from ..measure.record import FINISHED, Record
 from ..peers.packages import peers_command
 from ..tables.latex import latex
 from ..tables.layout import Figure
@@ -18,7 +18,7 @@ from ..tables.results import Results, listed, results_of
 from ..tables.table import Table
 from ..tables.writers import comma_separated, markdown
 from .headlines import Overview, absent, not_asked, overview
-from .page.page import Contents, render
+from .page import Contents, render
 from .sections import MOTIONS, SECTIONS
 
 # The formats of a table, by the suffix of the file.

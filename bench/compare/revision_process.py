@@ -4,7 +4,7 @@ A program of its own, run by path. From a revision of Plumbob the program import
 uses only names as old as the first records. From the user's project it measures the solvers.
 """
 
-import importlib
+import importlib.util
 import json
 import os
 import sys
@@ -23,8 +23,9 @@ def main(folder: str, scale: str, suites: str, solvers: str = "") -> None:
     is_own = not solvers
     bench = "bench" if is_own and not Path(folder, "plumbob", "bench").exists() else "plumbob.bench"
     experiments = importlib.import_module(f"{bench}.experiments")
-    record = importlib.import_module(f"{bench}.harness.record")
-    run = importlib.import_module(f"{bench}.harness.run")
+    is_older = importlib.util.find_spec(f"{bench}.measure") is None  # the folder's first name
+    folder_name = f"{bench}.harness" if is_older else f"{bench}.measure"
+    record, run = (importlib.import_module(f"{folder_name}.{name}") for name in ("record", "run"))
     if is_own and not Path(str(run.__file__)).resolve().is_relative_to(Path(folder).resolve()):
         sys.exit(f"expected the bench of {folder}, got {run.__file__}")
     size = experiments.SCALES[scale]

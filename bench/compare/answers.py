@@ -9,7 +9,7 @@ import numpy as np
 
 from plumbob.reference.arguments import distinct_texts
 
-from ..harness.metrics import chance_of_pairs
+from ..measure.metrics import chance_of_pairs
 from ..tables.table import words
 from .rows import ChangeVerdict, Pair, RowChange, RowKey
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import NamedTuple
 
-from ..harness.record import FINISHED, Record
-from ..harness.record import key as record_key
+from ..measure.record import FINISHED, Record
+from ..measure.record import key as record_key
 
 # Suite, problem, solver, and settings as JSON.
 RowKey = tuple[str, str, str, str]

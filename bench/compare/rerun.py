@@ -21,8 +21,8 @@ import numpy as np
 
 from plumbob.process.child import ChildProcess, LostError, one_thread
 
-from ..harness.metrics import adjusted
-from ..harness.record import Record, untyped
+from ..measure.metrics import adjusted
+from ..measure.record import Record, untyped
 from . import revision_process
 from .answers import is_time
 from .compare import RunComparison, row_changes

@@ -12,20 +12,20 @@ from markupsafe import Markup
 
 from plumbob.text import html
 
-from ...figures import svg
-from ...figures.robot_map import RobotMap
-from ...figures.sketch import Drawing
-from ...harness.record import Record
-from ...motion import motion
-from ...peers.packages import peers_command
-from ...tables.columns import words_in
-from ...tables.layout import Figure, Layout
-from ...tables.table import Table
-from ..headlines import Overview
-from ..sections import SECTIONS, Section
-from ..standings import Headline
+from ..figures import svg
+from ..figures.robot_map import RobotMap
+from ..figures.sketch import Drawing
+from ..measure.record import Record
+from ..peers.packages import peers_command
+from ..player import motion
+from ..tables.columns import words_in
+from ..tables.layout import Figure, Layout
+from ..tables.table import Table
 from .claim_strip import DECADES, ClaimDot, claim_dots
+from .headlines import Overview
 from .page_tables import PageTable, page_table, rich
+from .sections import SECTIONS, Section
+from .standings import Headline
 
 _FOLDER = Path(__file__).parent
 SCRIPT = motion.squeezed((_FOLDER / "page.js").read_text(encoding="utf-8"))

@@ -24,7 +24,7 @@ START_PATIENCE = 180.0
 # And on a target, for which a solver in Python may need seconds.
 TARGET_PATIENCE = 60.0
 Calculate = Callable[..., Mapping[str, Any]]
-_START = "import plumbob.bench.harness.isolation as i; i.main()"
+_START = "import plumbob.bench.measure.isolation as i; i.main()"
 
 
 class Started(NamedTuple):

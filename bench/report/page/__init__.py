@@ -1,1 +1,0 @@
-"""The page of the report: an HTML file from a template that escapes its texts."""
