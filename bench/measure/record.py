@@ -22,7 +22,6 @@ from plumbob.process.paths import check_folder, check_regular
 
 from . import values
 from .experiment import kind_of
-from .old_records import OldLine, measured_of
 
 FORMAT = 4  # raised when older readers would misread a record
 FILE_NAME = "records.jsonl"
@@ -57,9 +56,10 @@ class _Stamp(TypedDict, total=False):
     source: str
 
 
-class _Line(msgspec.Struct, tag_field="format", tag=FORMAT):
+class _Line(msgspec.Struct):
     """The fields of a line."""
 
+    format: Annotated[int, msgspec.Meta(ge=FORMAT, le=FORMAT)]
     suite: str
     problem: str
     solver: str
@@ -72,8 +72,8 @@ class _Line(msgspec.Struct, tag_field="format", tag=FORMAT):
     conditions: dict[str, str | int | float | None]
 
 
-_FIELDS = _Line.__struct_fields__
-_DECODER = msgspec.json.Decoder(_Line | OldLine)
+_FIELDS = _Line.__struct_fields__[1:]
+_DECODER = msgspec.json.Decoder(_Line)
 
 
 @dataclass(frozen=True, eq=False)
@@ -443,9 +443,9 @@ def untyped(line: bytes | str) -> Record:
         content = _DECODER.decode(line)
     except RecursionError:
         raise ValueError("nested too deeply") from None
-    measured = measured_of(content) if isinstance(content, OldLine) else content.measured
-    fields = {name: getattr(content, name) for name in _FIELDS if name != "measured"}
-    return Record(**fields, measured={name: _read(name, value) for name, value in measured.items()})
+    fields = {name: getattr(content, name) for name in _FIELDS}
+    fields["measured"] = {name: _read(name, value) for name, value in content.measured.items()}
+    return Record(**fields)
 
 
 def _plain(value: Any) -> Any:

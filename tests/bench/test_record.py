@@ -15,7 +15,7 @@ from hypothesis.extra import numpy as arrays
 
 from plumbob.bench.measure.block import Block
 from plumbob.bench.measure.measure import measure, record_of
-from plumbob.bench.measure.record import FILE_NAME, Record, RecordFile, decode, encode, key, untyped
+from plumbob.bench.measure.record import FILE_NAME, Record, RecordFile, decode, encode, key
 
 ANY_FLOATS = arrays.arrays(
     np.float64, arrays.array_shapes(max_dims=3), elements=st.floats(allow_nan=True)
@@ -61,19 +61,6 @@ def test_integers_truth_values_and_words_come_back_as_they_are():
     assert returned(failed="no file \udcff")["failed"] == "no file ?"
     with pytest.raises(ValueError, match="expected numbers"):
         encode(Record("s", "p", "v", measured={"x": np.array([None])}))
-
-
-def test_a_line_of_format_3_is_read_by_the_names_of_today():
-    line = {
-        "format": 3, "suite": "ik", "problem": "p", "solver": "v", "settings": {}, "size": 2,
-        "arrays": {"claimed": [1, 0], "setup": "nan"}, "notes": {"remark": "old"}, "stamp": {},
-        "when": "2000-01-02T03:04:05+00:00", "seconds": 1.0, "facts": {"tips": ["hand"]},
-        "conditions": {},
-    }  # fmt: skip
-    back = untyped(json.dumps(line))
-    assert back.measured["claims"].tolist() == [1, 0]
-    assert math.isnan(back.measured["setup"])
-    assert (back.remark, back.measured["effectors"]) == ("old", ["hand"])
 
 
 def test_the_key_ignores_the_order_of_settings_but_not_their_values():
@@ -137,7 +124,7 @@ WRONG = {
     **dict.fromkeys([("stamp", "machine"), ("stamp", "versions")], MAP),
     ("settings", "tolerance"): ([], {}, [1.0]),
     ("measured", "residual"): NO_NUMBERS,
-    ("format",): (None, 0, 1, 2, 5, 99, "4", True, [], 1.5),
+    ("format",): (None, 0, 1, 3, 5, 99, "4", True, [], 1.5),
 }
 
 

@@ -59,14 +59,13 @@ from ..experiments import measure as arrays
 def block_key(block):
     return "timing", "p", block, "{}"
 def measure(block):
-    return {"suite": "timing", "problem": "p", "solver": block, "arrays": arrays(block)}
+    return {"suite": "timing", "problem": "p", "solver": block, "measured": arrays(block)}
 """
 RECORD = """
 import json
-REST = {"settings": {}, "size": 0, "notes": {}, "stamp": {}, "when": "", "seconds": 0}
-REST |= {"facts": {}, "conditions": {}}
+REST = {"settings": {}, "size": 0, "stamp": {}, "when": "", "seconds": 0, "conditions": {}}
 def encode(record):
-    return json.dumps({"format": 3, **record, **REST})
+    return json.dumps({"format": 4, **record, **REST})
 """
 
 
@@ -81,15 +80,14 @@ def write(folder, loops=LOOPS, digit=0.5):
 
 
 @pytest.fixture
-def repository(tmp_path):
+def repository(tmp_path, request):
     """A clone whose one commit is tagged `before`, with the small bench in it."""
-    folder = tmp_path / "clone"
-    for name in ("bench/experiments", "bench/harness"):
-        (folder / name).mkdir(parents=True)
-    for name in ("bench", "bench/harness"):
-        (folder / name / "__init__.py").write_text("")
-    (folder / "bench" / "harness" / "record.py").write_text(RECORD)
-    (folder / "bench" / "harness" / "run.py").write_text(RUN)
+    folder, room = tmp_path / "clone", getattr(request, "param", "measure")
+    files = {"record": RECORD, "run": RUN, "__init__": "", "../__init__": ""}
+    for name in ("experiments", room):
+        (folder / "bench" / name).mkdir(parents=True)
+    for name, text in files.items():
+        (folder / "bench" / room / f"{name}.py").write_text(text)
     (folder / "pyproject.toml").write_text('[project]\nname = "plumbob"\n')
     write(folder)
     git(folder, "init", "-q")
@@ -173,6 +171,7 @@ def measure_endlessly(repository):
     git(repository, "tag", "-f", "before")
 
 
+@pytest.mark.parametrize("repository", ["harness", "measure"], indirect=True)
 def test_a_revision_beside_itself_answers_alike_and_one_pair_tells_no_drift(repository):
     made = side_by_side(repository, words=("stead",), pairs=1)
     assert {row.key[2] for row in made.rows} == {"steady"}
