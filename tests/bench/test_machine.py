@@ -147,7 +147,7 @@ def test_measurements_never_import_presentation():
     "line",
     [
         "import plumbob.bench.page.report",
-        "from ..report import sections",
+        "from ..page import sections",
         "from plumbob.bench.page import sections",
         "def f():\n    from ..tables.results import label",
         'importlib.import_module("plumbob.bench.tables.results")',
