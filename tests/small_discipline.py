@@ -57,12 +57,12 @@ class SmallDiscipline:
         if not wrong:
             return Diagnosis()
         variants = [Variant(("own_rotation",), self._wrong)]
-        told, tried = explain(
-            variants, wrong, lambda case: 1e-9,
+        told = explain(
+            variants, wrong, 1e-9,
             lambda keys: sentence("Its own rotation is applied to a joint's own offset."),
         )  # fmt: skip
         broken = None if told else sentence("The law of positions broke first, at joint 1.")
-        return Diagnosis(told, None, broken, (sentence("It remembers earlier requests."),), tried)
+        return Diagnosis(told, None, broken, (sentence("It remembers earlier requests."),))
 
 
 def a_pose(seed, i, method):

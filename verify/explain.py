@@ -5,7 +5,7 @@ of it suffices.
 """
 
 import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -42,44 +42,38 @@ class Match(NamedTuple):
     """How well a variant reproduces answers."""
 
     variant: Variant
-    share: float  # of the answers, or of those that fail if that is less
-    distance: float  # the largest relative difference of those
+    share: float  # of the answers
+    distance: float  # the largest relative difference of the reproduced answers
     predictions: list[Mapping[str, Any]]
 
 
 def explain(
     variants: Iterable[Variant],
     exchanges: Sequence[Exchange],
-    tolerance: Callable[[Case], float],
+    tolerance: float,
     describe: Callable[[Sequence[str]], Sentence],
     trial: int = TRIAL,
-    failing: Collection[str] = (),
-) -> tuple[tuple[Explanation, ...], int]:
-    """Return the variants that reproduce most answers, nearest first, and the number compared.
+) -> tuple[Explanation, ...]:
+    """Return the variants that reproduce most answers, nearest first.
 
-    The variants come in ascending order of the number of faults, special ones of a number last, the
-    most telling answers first: small, and wrong. `tolerance` is the relative difference that
+    The variants come in ascending order of the number of faults, special variants last; the most
+    telling answers come first: small, and wrong. `tolerance` is the relative difference that
     rounding explains; `describe` puts the faults into words, given the keys of a class that no
-    answer tells apart. Of the first `trial` answers a variant has to reproduce any, and of the
-    `failing` cases, by their names, the least share.
+    answer tells apart. A variant has to reproduce one of the first `trial` answers.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
-    count, matches = 0, list[Match]()
+    matches = list[Match]()
     for _, same_size in groupby(variants, key=lambda v: (len(v.faults), v.is_special)):
-        for variant in same_size:
-            count += 1
-            match = _match(variant, answers, tolerance, trial, failing)
-            if match is not None:
-                matches.append(match)
+        matches += filter(None, (_match(v, answers, tolerance, trial) for v in same_size))
         if any(match.share == 1.0 for match in matches):
             break
     matches = _telling(matches)
     matches.sort(key=lambda match: (-match.share, len(match.variant.faults), match.distance))
     explanations = []
-    for group in _classes(matches, answers, tolerance)[:EXPLANATIONS]:
+    for group in _classes(matches, tolerance)[:EXPLANATIONS]:
         keys = tuple(dict.fromkeys(" + ".join(match.variant.faults) for match in group))
         explanations.append(Explanation(keys, describe(keys), group[0].share, group[0].distance))
-    return tuple(explanations), count
+    return tuple(explanations)
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
@@ -101,34 +95,23 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
 
 
 def _match(
-    variant: Variant,
-    answers: Sequence[Exchange],
-    tolerance: Callable[[Case], float],
-    trial: int,
-    failing: Collection[str],
+    variant: Variant, answers: Sequence[Exchange], tolerance: float, trial: int
 ) -> Match | None:
-    hits, largest = list[str](), 0.0
-    predictions: list[Mapping[str, Any]] = []
+    """Return how well a variant reproduces answers, None if it reproduces no early answer."""
+    distances, predictions = list[float](), list[Mapping[str, Any]]()
     for i, exchange in enumerate(answers):
-        if i == trial and not hits:
+        if i == trial and not distances:
             return None
         assert isinstance(exchange.answer, Answer)
         outputs = exchange.answer.values
         prediction = _predict(variant, exchange.case)
         predictions.append({k: v for k, v in prediction.items() if k in outputs})
         distance = difference(predictions[-1], outputs)
-        if distance <= variant.amplification * tolerance(exchange.case):
-            hits.append(exchange.case.name)
-            largest = max(largest, distance)
-    share = share_of(hits, [exchange.case.name for exchange in answers], failing)
-    return Match(variant, share, largest, predictions) if hits else None
-
-
-def share_of(hits: Collection[str], names: Sequence[str], failing: Collection[str]) -> float:
-    """Return the share of hits among cases, or among the failing cases if that is less."""
-    groups = names, [name for name in names if name in failing]
-    shares = [sum(name in hits for name in group) / len(group) for group in groups if group]
-    return min(shares, default=0.0)
+        if distance <= variant.amplification * tolerance:
+            distances.append(distance)
+    if not distances:
+        return None
+    return Match(variant, len(distances) / len(answers), max(distances), predictions)
 
 
 def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
@@ -139,20 +122,17 @@ def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
         return {}
 
 
-def _classes(
-    matches: Sequence[Match], answers: Sequence[Exchange], tolerance: Callable[[Case], float]
-) -> list[list[Match]]:
-    """Return matches grouped with others of the same faults, or that no answer tells apart.
+def _classes(matches: Sequence[Match], tolerance: float) -> list[list[Match]]:
+    """Return matches grouped with matches of the same faults, or that no answer tells apart.
 
     The latter have as many faults; the former are of programs that make other choices beside them.
     """
 
     def is_alike(first: Match, second: Match) -> bool:
         faults, others = first.variant.faults, second.variant.faults
-        pairs = zip(first.predictions, second.predictions, answers, strict=True)
+        pairs = zip(first.predictions, second.predictions, strict=True)
         return faults == others or (
-            len(faults) == len(others)
-            and all(difference(a, b) <= tolerance(exchange.case) for a, b, exchange in pairs)
+            len(faults) == len(others) and all(difference(*pair) <= tolerance for pair in pairs)
         )
 
     classes: list[list[Match]] = []
@@ -216,33 +196,9 @@ def separating_bound(last: float, before: float) -> float | None:
 
 
 def together(mistakes: Sequence[Sentence]) -> Sentence:
-    """Return the sentences of one to three simultaneous mistakes as a single sentence."""
+    """Return the sentences of one mistake, or of two simultaneous mistakes, as one sentence."""
     if len(mistakes) == 1:
         return mistakes[0]
-    template = (
-        sentence("Two mistakes at once: (1) {one} (2) {other}")
-        if len(mistakes) == 2
-        else sentence("Three mistakes at once: (1) {one} (2) {other} (3) {another}")
+    return sentence(
+        "Two mistakes at once: (1) {one} (2) {other}", one=mistakes[0], other=mistakes[1]
     )
-    return _filled(template, mistakes)
-
-
-def either(explanations: Sequence[Sequence[Sentence]]) -> Sentence:
-    """Return explanations (lists of mistakes) that no answer tells apart as a single sentence."""
-    shared = [m for m in explanations[0] if all(m in mistakes for mistakes in explanations)]
-    alternatives = [[m for m in mistakes if m not in shared] for mistakes in explanations]
-    if not all(alternatives):
-        return together(explanations[0])
-    template = (
-        sentence("One of two explanations, which the answers do not tell apart: (a) {one} (b) "
-                 "{other}")
-        if len(alternatives) == 2
-        else sentence("One of several explanations, which the answers do not tell apart: (a) {one} "
-                      "(b) {other} (c) {another}")
-    )  # fmt: skip
-    return together([*shared, _filled(template, list(map(together, alternatives)))])
-
-
-def _filled(template: Sentence, parts: Sequence[Sentence]) -> Sentence:
-    fields = dict(zip(("one", "other", "another"), parts, strict=False))
-    return Sentence(template.template, fields)

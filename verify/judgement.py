@@ -1,7 +1,7 @@
 """Findings about answers, their verdicts, and the reports on tasks."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from functools import cached_property
 from typing import Any
@@ -97,8 +97,6 @@ class Diagnosis:
     hints: tuple[Sentence, ...] = ()  # at mistakes that no variant has
     is_double: bool = False  # whether the answers have more digits than single precision leaves
     is_certain: bool = False  # whether no other cause is sought
-    # by case, the answer of the same program without the fault, where many answers are right
-    expected: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     observations: tuple[Sentence, ...] = ()  # what answers show without any catalogue
 
     @property

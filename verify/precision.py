@@ -22,8 +22,6 @@ MIN_NUMBERS, MIN_SHARE = 6, 0.25
 MIN_DIGITS, MAX_DIGITS = 4, 14
 # The digits that single precision is printed with, and those that it leaves correct in most cases.
 SINGLE, CORRECT = (8, 9), (5.0, 9.0)
-# Some answers of single precision are exact by chance; of double precision several have so many.
-DOUBLE, MIN_DOUBLE = 11.0, 3
 # Single precision keeps lengths to about 1e-7, double precision to much less.
 EXACT = 1e-11
 AS_SINGLE = sentence(
@@ -161,12 +159,6 @@ def _is_exact(report: TaskReport) -> bool:
         if finding.law in ("unit quaternions", "link lengths")
     ]
     return bool(errors) and float(np.median(errors)) < EXACT
-
-
-def has_double(report: TaskReport) -> bool:
-    """Return whether some answers have more digits than single precision leaves."""
-    digits = [judgement.digits or 0.0 for judgement in report.judgements]
-    return sum(count > DOUBLE for count in digits) >= MIN_DOUBLE
 
 
 def are_off_by_single(judgements: Sequence[CaseJudgement]) -> bool:

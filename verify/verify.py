@@ -233,12 +233,7 @@ def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnos
         return report
     diagnosis = diagnose(report)
     explanations = (*before.explanations, *diagnosis.explanations)
-    diagnosis = replace(diagnosis, explanations=explanations)
-    judgements = [
-        replace(j, expected=j.expected or diagnosis.expected.get(j.case.name, {}))
-        for j in report.judgements
-    ]
-    return replace(report, judgements=judgements, diagnosis=diagnosis)
+    return replace(report, diagnosis=replace(diagnosis, explanations=explanations))
 
 
 def _is_of_inputs(explanation: Explanation) -> bool:

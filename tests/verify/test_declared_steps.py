@@ -3,10 +3,6 @@
 import numpy as np
 import pytest
 
-from plumbob.text.sentence import sentence
-from plumbob.verify.case import Case
-from plumbob.verify.exchange import Answer, Exchange
-from plumbob.verify.explain import Variant, explain
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import Verdict
@@ -15,8 +11,8 @@ from plumbob.verify.mass_spring.honest import honest
 from plumbob.verify.mass_spring.model import Integrator, StepModel, simulate
 from plumbob.verify.mass_spring.pin_strength import measured_pins
 from plumbob.verify.mass_spring.problem import problem_of
-from plumbob.verify.self_test import Stepper
 from plumbob.verify.verify import DISCIPLINES, judge_cases
+from tests.honest_solvers import Stepper
 
 STEP, MOTION = "mass_spring_step", "mass_spring_motion"
 
@@ -252,22 +248,3 @@ def test_few_iterations_in_place_of_a_converged_step_are_told():
     assert report.verdict is Verdict.WRONG
     (explanation,) = report.diagnosis.explanations
     assert "behaves like this: 4 local/global iterations from y" in str(explanation.sentence)
-
-
-@pytest.mark.parametrize(("explained", "share"), [(0, None), (1, None), (2, 0.5), (4, 1.0)])
-def test_a_mistake_that_explains_few_of_the_failing_cases_is_not_named(explained, share):
-    """Six answers of ten are right, and the mistake does not show in their cases."""
-    cases = [Case(str(number), STEP, {}, "", sentence("")) for number in range(10)]
-    answers = [Answer({"positions": np.ones(3)}, 0.0) for _ in cases]
-    exchanges = [Exchange(*pair, pair[1]) for pair in zip(cases, answers, strict=True)]
-
-    def predict(case):
-        is_missed = explained <= int(case.name) < 4
-        return {"positions": np.ones(3) + is_missed}
-
-    variants = [Variant(("mistake",), predict)]
-    failing = [case.name for case in cases[:4]]
-    explanations, _ = explain(
-        variants, exchanges, lambda case: 1e-9, lambda keys: sentence(""), 10, failing
-    )
-    assert [explanation.share for explanation in explanations] == ([share] if share else [])

@@ -7,7 +7,6 @@ import translate as catalogue
 
 from plumbob.text.language import LANGUAGES, language_of, translator
 from plumbob.text.sentence import sentence
-from plumbob.verify.explain import either
 
 TRANSLATED = [name for name in LANGUAGES if LANGUAGES[name]]
 TEMPLATES = catalogue.templates()
@@ -96,12 +95,3 @@ def test_sentences_within_sentences_are_translated():
 def test_a_language_that_is_unknown_is_refused():
     with pytest.raises(ValueError, match="lang: expected one of en, zh, got 'fr'"):
         language_of("fr")
-
-
-def test_mistakes_that_all_explanations_share_are_said_once():
-    a, b, c = map(sentence, ("A.", "B.", "C."))
-    choice = "One of two explanations, which the answers do not tell apart: (a) "
-    assert str(either([[a]])) == "A."
-    assert str(either([[a, b]])) == "Two mistakes at once: (1) A. (2) B."
-    assert str(either([[a], [b]])) == f"{choice}A. (b) B."
-    assert str(either([[a, c], [b, c]])) == f"Two mistakes at once: (1) C. (2) {choice}A. (b) B."

@@ -22,8 +22,8 @@ from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.precision import has_double
 from plumbob.verify.screen import json_file, junit, page, terminal
 from plumbob.verify.screen.words import Presentation, speaker
-from plumbob.verify.self_test import DECLARED, Stepper
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
+from tests.honest_solvers import DECLARED, Stepper
 
 
 def forward_kinematics(code):

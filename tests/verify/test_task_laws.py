@@ -401,5 +401,5 @@ def test_a_fault_is_named_once_for_all_programs_that_it_may_be_in():
         return Variant(faults, lambda case: right[min(case.inputs["i"], last)])
 
     variants = [variant(2, "a"), variant(1, "a"), variant(1, "b")]
-    told, _ = explain(variants, asked, lambda case: 1e-9, lambda keys: sentence("It is wrong."))
+    told = explain(variants, asked, 1e-9, lambda keys: sentence("It is wrong."))
     assert [(one.faults, one.share) for one in told] == [(("a",), 0.75), (("b",), 0.5)]

@@ -106,7 +106,7 @@ def of_program(
         )
 
     telling = telling_answers(different, same)
-    return explain(variants(), telling, lambda _: tolerance, describe, trial_count(report))[0]
+    return explain(variants(), telling, tolerance, describe, trial_count(report))
 
 
 def of_entries(
@@ -169,8 +169,8 @@ def _of_changes(
             return changes_in_words(others, list(others), parts[0].equal_count)
         return together([words for part in parts for words in _sentences_of(part)])
 
-    return explain(variants(), telling_answers(different, same), lambda _: tolerance, describe,
-                   trial_count(report))[0]  # fmt: skip
+    telling = telling_answers(different, same)
+    return explain(variants(), telling, tolerance, describe, trial_count(report))
 
 
 def _parts(change: Entry | ChangePair) -> tuple[Entry, ...]:
@@ -251,7 +251,7 @@ def of_numbers(
             yield Variant((key,), predict, is_special=True)
 
     telling, words = telling_answers(different, same), partial(changes_in_words, mutants)
-    return explain(variants(), telling, lambda _: tolerance, words, trial_count(report))[0]
+    return explain(variants(), telling, tolerance, words, trial_count(report))
 
 
 def _changed_answer(
