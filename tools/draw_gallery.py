@@ -3,10 +3,10 @@
 Curves and cloths stand still, in SVG; two famous faults move, in GIF.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib as mpl
 from draw_lab import DOCS, shorten
@@ -19,8 +19,9 @@ from plumbob.bench.show.scene_solver import SceneSolver
 from plumbob.bench.show.scenes import CLOTH, EXACT
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
-from plumbob.verify.mass_spring.model import Integrator, StepModel
-from plumbob.verify.self_test import STEP, Stepper, Subject, subjects
+from plumbob.verify.mass_spring.model import Integrator, StepModel, simulate
+from plumbob.verify.mass_spring.problem import problem_of
+from plumbob.verify.self_test import subjects
 
 CURVE, EXPLODING = "heart", "explicit Euler"
 # A film shows every third frame of a scene, in a small picture.
@@ -40,9 +41,9 @@ MISSING_PARENT = FamousFault(
     "Parent's rotation left out", "CCD", "rotations not accumulated", CURVE
 )
 NO_BACKWARD_PASS = FamousFault("No backward pass", "FABRIK", "no backward pass", CURVE)
-DRIFTING_PINS = FamousFault("Pins that drift", "steps", "pins of one kilogram")
-DOUBLE_GRAVITY = FamousFault("Gravity twice", "steps", "gravity doubled")
-EXPLICIT_EULER = FamousFault("Explicit Euler explodes", "steps", EXPLODING)
+DRIFTING_PINS = FamousFault("Pins that drift", "STEP", "pins of one kilogram")
+DOUBLE_GRAVITY = FamousFault("Gravity twice", "STEP", "gravity doubled")
+EXPLICIT_EULER = FamousFault("Explicit Euler explodes", "STEP", EXPLODING)
 # Faulty solvers beside the right one, by the file's name; the solver of Plumbob beside each.
 PICTURES = {
     "curves.svg": ("fabrik", (MISSING_PARENT, NO_BACKWARD_PASS)),
@@ -77,22 +78,20 @@ def beside_truth(solver: str, faults: Sequence[FamousFault]) -> Scene:
 
 
 def solver_of(fault: FamousFault) -> SceneSolver:
-    """Return the solver that has a fault."""
-    subject = subject_of(fault)
-    solver = FunctionConnection({subject.task: subject.function}, subject.greeting)
-    return SceneSolver(fault.title, solver)
-
-
-def subject_of(fault: FamousFault) -> Subject:
     """Return the subject of the self-test that has a fault, or explicit Euler.
 
     Explicit Euler is an honest method, but unstable on the cloth.
     """
     for subject in subjects():
         if (subject.family, subject.name) == (fault.family, fault.fault):
-            return subject
-    step = Stepper(StepModel(Integrator("explicit"), velocity="separate"))
-    return Subject(EXPLODING, "steps", STEP, step, Greeting(PROTOCOL, (STEP,)))
+            return SceneSolver(fault.title, subject.connection)
+    model = StepModel(Integrator("explicit"), velocity="separate")
+
+    def step(**inputs: Any) -> Mapping[str, Any]:
+        return simulate(problem_of(inputs), model)
+
+    greeting = Greeting(PROTOCOL, ("mass_spring_step",))
+    return SceneSolver(fault.title, FunctionConnection({"mass_spring_step": step}, greeting))
 
 
 def thinned(scene: Scene) -> Scene:

@@ -15,8 +15,8 @@ from plumbob.verify.judgement import Verdict
 from plumbob.verify.mass_spring import energy
 from plumbob.verify.mass_spring.model import Integrator, StepModel
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.self_test import Stepper
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
+from tests.honest_solvers import Stepper
 
 pytestmark = pytest.mark.usefixtures("verdict_alone")
 

@@ -12,21 +12,16 @@ from kinematics_solvers import faulty
 from rich.cells import cell_len
 
 from plumbob.cli import main as cli
-from plumbob.text.sentence import codes_in, sentence
+from plumbob.text.sentence import sentence
 from plumbob.verify.fault_programs import (
     FAMILIES,
-    PROGRAMS,
     coded_faults,
-    connection_to,
-    source_of,
 )
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
-from plumbob.verify.judgement import Verdict
 from plumbob.verify.screen import json_file, junit, page, terminal
 from plumbob.verify.screen.fault_text import cause_and_remedy, explained, failure_of, fault_help
 from plumbob.verify.screen.words import Presentation, advice, speaker
-from plumbob.verify.task import TASKS
 from plumbob.verify.verify import verify
 
 REMEDY = sentence("Remedy")
@@ -81,20 +76,7 @@ def test_cases_are_folded_where_a_mistake_is_shown(codes, is_open):
     assert ("<details open>" in text) is is_open
 
 
-# ---- the short programs of each code
-
-
-def reports(program, task):
-    (report,) = verify(connection_to(program), [task]).tasks
-    return report
-
-
-# `verify --self-test` judges the programs of the others, in test_self_test.py.
-FAMILIES_HERE = ("TRACK", "STOP", "CLAIM", "JACOBIAN", "RESAMPLE")
-
-
-def codes_with_programs():
-    return [fault.code for fault in coded_faults().values() if fault.family in FAMILIES_HERE]
+# ---- the short programs of each code, which test_self_test.py judges
 
 
 def test_no_cause_has_figures_of_the_answers_of_a_run():
@@ -106,39 +88,6 @@ def test_no_cause_has_figures_of_the_answers_of_a_run():
         or {"count", "total"} & fault.sentence.values.keys()
     ]
     assert counted == []
-
-
-# Known by the positions of any method, and by the method.
-EQUAL = {"PB-TRACK-021": "PB-TRACK-006"}
-
-
-@pytest.mark.sweep(
-    "code", codes_with_programs, without=["STOP", "CLAIM", "JACOBIAN", "TRACK"], every=20
-)
-def test_a_wrong_program_is_named_by_its_code(code):
-    fault = coded_faults()[code]
-    report = reports(fault.wrong_program, fault.task)
-    assert report.verdict > Verdict.RIGHT
-    names = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
-    names += report.diagnosis.hints
-    if report.verdict == Verdict.RIGHT_EXCEPT:  # it may be on purpose
-        names += [words for judgement in report.judgements for words in judgement.complaints]
-    assert EQUAL.get(code, code) in {known for words in names for known in codes_in(words)}
-
-
-# Programs of equations alone answer no request; tests/verify/test_tool_steps.py solves them.
-RIGHT_PROGRAMS = {name: e["task"] for name, e in PROGRAMS.items() if e["task"] in TASKS}
-RESERVED = ("robot", "robot_track", "fabrik by angles")
-
-
-@pytest.mark.sample(every=40)
-@pytest.mark.parametrize("name", RIGHT_PROGRAMS)
-def test_a_right_program_is_right(name):
-    tasks = verify(connection_to(source_of(name)), [RIGHT_PROGRAMS[name]]).tasks
-    # A start without a solution of a robot, one iteration in each frame, a link of no length.
-    expected = Verdict.RIGHT_EXCEPT if name in RESERVED else Verdict.RIGHT
-    assert {report.verdict for report in tasks} == {expected}
-    assert not any(report.diagnosis.explanations for report in tasks)
 
 
 def test_a_line_that_the_program_lacks_is_refused():

@@ -13,8 +13,8 @@ from plumbob.verify.kinematics.predictions import forward, path_to, solve
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.screen.terminal import lines
 from plumbob.verify.screen.words import Presentation, speaker
-from plumbob.verify.self_test import DECLARED, Stepper
 from plumbob.verify.verify import verify
+from tests.honest_solvers import DECLARED, Stepper
 
 FK, IK, FORCES, STEP = (
     "forward_kinematics", "inverse_kinematics", "mass_spring_forces", "mass_spring_step",

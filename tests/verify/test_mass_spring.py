@@ -31,13 +31,13 @@ from plumbob.verify.mass_spring.problem import (
 )
 from plumbob.verify.screen import terminal
 from plumbob.verify.screen.words import Presentation, speaker
-from plumbob.verify.self_test import (
+from plumbob.verify.verify import MAX_HANGS, verify
+from tests.honest_solvers import (
     CONVERGED,
     DECLARED,
     LINEARISED,
     Stepper,
 )
-from plumbob.verify.verify import MAX_HANGS, verify
 
 
 def report(function, task="mass_spring_step", step=None, **greeting):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from plumbob.text.sentence import Say, Sentence, sentence
 
 from ..connections.export import export_cases
+from ..fault_programs import FAMILIES
 from ..task import TASKS, Field, Task
 from .terminal import paragraphs, wrapped
 
@@ -96,7 +97,8 @@ def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
     for trial in trials:
         families.setdefault(trial.subject.family, []).append(trial)
     for family, members in families.items():
-        yield say(_sum(family, members))
+        about = Sentence(FAMILIES[family]["about"], {}) if family in FAMILIES else family
+        yield say(_sum(about, members))
     failed = [trial for members in families.values() for trial in members if not trial.passed]
     for trial in failed:
         yield say(sentence(
@@ -111,7 +113,7 @@ def self_test(trials: Iterable["Trial"], say: Say) -> Iterator[str]:
     )
 
 
-def _sum(family: str, members: list["Trial"]) -> Sentence:
+def _sum(family: str | Sentence, members: list["Trial"]) -> Sentence:
     from ..self_test import HONEST
 
     n, accused = len(members), sum(not trial.passed for trial in members)
