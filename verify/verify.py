@@ -8,11 +8,9 @@ import msgspec
 
 from plumbob.text.sentence import Sentence, codes_in, sentence
 
-from . import inference, kept_state, precision, zeros
 from .case import Case
 from .cause_search import SECONDS, CauseSearch, JudgedAnswers
 from .disciplines import DISCIPLINES
-from .examination import Examiner
 from .exchange import Connection, Exchange, Failure, NoGreetingError, is_hung
 from .greeting import Greeting
 from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
@@ -22,6 +20,8 @@ from .laws import NO_NUMBERS
 from .mass_spring import energy, forces
 from .observe import observations
 from .one_line.search import with_changed_line
+from .take import inference, kept_state, precision, zeros
+from .take.examination import Examiner
 from .task import BUILDS_ON
 from .timing import with_lesser_time
 

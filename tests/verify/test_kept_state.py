@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from kinematics_solvers import FORWARD, textbook
 
-from plumbob.verify import kept_state
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
+from plumbob.verify.take import kept_state
 from plumbob.verify.verify import verify
 
 RIGHT = textbook(FORWARD)

@@ -19,9 +19,9 @@ from plumbob.verify.judgement import (
     Verdict,
 )
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.precision import has_double
 from plumbob.verify.screen import json_file, junit, page, terminal
 from plumbob.verify.screen.words import Presentation, speaker
+from plumbob.verify.take.precision import has_double
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 from tests.honest_solvers import DECLARED, Stepper
 

@@ -36,7 +36,7 @@ from plumbob.verify.kinematics.predictions import predict_track
 from plumbob.verify.laws import HOLDS, equal_answers
 from plumbob.verify.mass_spring import energy, forces
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
-from plumbob.verify.precision import AS_SINGLE, are_off_by_single, judging_greeting
+from plumbob.verify.take.precision import AS_SINGLE, are_off_by_single, judging_greeting
 
 EPSILON = 2.0**-52
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG

@@ -10,10 +10,10 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence, sentence
 
+from ..exchange import Answer, Exchange
+from ..greeting import Greeting
+from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 from .examination import Examination
-from .exchange import Answer, Exchange
-from .greeting import Greeting
-from .judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 
 # The numbers of an output that suffice, since 99 % of doubles have 15 digits or more; requests with
 # no larger share of such numbers are left out.

@@ -7,17 +7,17 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from .case import Case
-from .exchange import Answer, Connection, Exchange
-from .gaps import largest_gap
-from .greeting import Fixed
-from .judgement import TaskReport, Verdict
-from .kinematics import problems
-from .kinematics.pose_laws import read_pose
-from .kinematics.predictions import solve
-from .kinematics.rounding import STALL
-from .kinematics.sweeps import PoseTrial
-from .kinematics.textbook import SOLVERS, Choices
+from ..case import Case
+from ..exchange import Answer, Connection, Exchange
+from ..gaps import largest_gap
+from ..greeting import Fixed
+from ..judgement import TaskReport, Verdict
+from ..kinematics import problems
+from ..kinematics.pose_laws import read_pose
+from ..kinematics.predictions import solve
+from ..kinematics.rounding import STALL
+from ..kinematics.sweeps import PoseTrial
+from ..kinematics.textbook import SOLVERS, Choices
 
 # The requests in which an input is changed; all answers must stay the same.
 TRIALS = 3

@@ -3,9 +3,9 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from .exchange import Connection, Exchange
-from .greeting import Greeting
-from .judgement import TaskReport
+from ..exchange import Connection, Exchange
+from ..greeting import Greeting
+from ..judgement import TaskReport
 
 
 class Examination(Protocol):

@@ -8,10 +8,10 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 
+from ..exchange import Answer, Connection, is_hung
+from ..gaps import largest_gap
+from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from .examination import Examination
-from .exchange import Answer, Connection, is_hung
-from .gaps import largest_gap
-from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
 # Inputs of springs that may be zero.
 NAMES = ("stiffnesses", "dampings")

@@ -18,16 +18,16 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence, sentence
 
+from ..case import Case
+from ..exchange import Answer, Connection, Failure, is_hung
+from ..gaps import largest_gap
+from ..greeting import Greeting
+from ..judgement import TaskReport, Verdict
+from ..kinematics.robot_models import urdf
+from ..task import TASKS
 from . import precision
-from .case import Case
 from .constants import MEASURES, is_unread
 from .examination import Examination
-from .exchange import Answer, Connection, Failure, is_hung
-from .gaps import largest_gap
-from .greeting import Greeting
-from .judgement import TaskReport, Verdict
-from .kinematics.robot_models import urdf
-from .task import TASKS
 
 # The largest requests in which an input is changed; all answers must stay the same.
 TRIALS = 3

@@ -7,10 +7,10 @@ from pathlib import Path
 
 from plumbob.text.sentence import Sentence, with_code
 
+from ..exchange import Answer, Connection, is_hung
+from ..gaps import difference
+from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from .examination import Examination
-from .exchange import Answer, Connection, is_hung
-from .gaps import difference
-from .judgement import CaseJudgement, Explanation, TaskReport, Verdict
 
 NAME = "state kept between requests"
 FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]
