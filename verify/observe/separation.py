@@ -220,13 +220,14 @@ def _one_sided(
     hits, others = int((mask & wrong).sum()), int((mask & ~wrong).sum())
     remaining, missed = int((~mask).sum()), int((~mask & wrong).sum())
     right = int((~wrong).sum())
-    values: dict[str, Any] = {"place": _stated(predicate), "quantity": quantity, "count": hits}
+    values: dict[str, Any] = {"quantity": quantity, "count": hits}
     if not missed and others <= MAX_EXCEPTIONS * right:
         words = sentence(
-            "All {count} wrong ones are {place}, and {others} of the {right} right ones: "
-            "{quantity}.",
-            others=others,
-            right=right,
+            "Never wrong {place}: {quantity}. Elsewhere {count} of {total} are wrong."
+            if predicate.is_negation
+            else "Wrong only {place}: {quantity} ({count} of {total} there).",
+            place=predicate.words,
+            total=hits + others,
             **values,
         )
         return 1.0 - others / right, words
@@ -235,6 +236,7 @@ def _one_sided(
     if not others and is_common and missed <= MAX_EXCEPTIONS * remaining:
         words = sentence(
             "All {count} {place} are wrong; elsewhere {missed} of {remaining}: {quantity}.",
+            place=_stated(predicate),
             missed=missed,
             remaining=remaining,
             **values,
