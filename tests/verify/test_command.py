@@ -10,11 +10,10 @@ from types import ModuleType, SimpleNamespace
 
 import numpy as np
 import pytest
-from small_discipline import SMALL
+from small_discipline import SMALL, use_small_disciplines
 
 from plumbob.cli import main as cli
 from plumbob.text.sentence import sentence
-from plumbob.verify import verify
 from plumbob.verify.case import Case
 from plumbob.verify.connections import saved
 
@@ -66,8 +65,7 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("LC_ALL", "LC_MESSAGES", "LANG"):
         monkeypatch.delenv(name, raising=False)
-    for task, one in SMALL.items():
-        monkeypatch.setitem(verify.DISCIPLINES, task, one)
+    use_small_disciplines(monkeypatch)
     for name, text in SOLVERS.items():
         (tmp_path / name).write_text(text)
     (tmp_path / "program.py").write_text(PROGRAM)
@@ -311,10 +309,10 @@ def test_misuse_exits_2_with_one_sentence(capsys, folder, arguments, words):
 LAWS = """
 from plumbob.testing import laws
 import right, wrong
-from plumbob.verify import verify
-from small_discipline import SMALL
+import pytest
+from small_discipline import use_small_disciplines
 
-verify.DISCIPLINES.update(SMALL)
+use_small_disciplines(pytest.MonkeyPatch())
 test_right = laws(right)
 test_wrong = laws(forward_kinematics=wrong.forward_kinematics, seed=1)
 """

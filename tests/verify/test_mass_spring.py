@@ -154,7 +154,7 @@ def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told():
     assert laws_that_hold == {"pins", "momentum", "equal answers", "symmetry", "consistency"}
     screen = " ".join(" ".join(terminal.lines(
         Report(Greeting(1, ("mass_spring_step",)), [judged], 0),
-        Presentation(speaker("en"), "en", ["x.py"]), terminal.ENDLESS,
+        Presentation(speaker("en"), "en", ["x.py"]),
     )).split())  # fmt: skip
     assert nearest in screen
     assert holds in screen

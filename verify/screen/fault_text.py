@@ -16,8 +16,8 @@ from ..judgement import CaseJudgement, Verdict
 from ..verify import judge_cases, trials
 from .terminal import numbers, wrapped
 
-# The lines around a change, and of the numbers of a failing case.
-CONTEXT, ROWS = 2, 4
+# The lines around a change.
+CONTEXT = 2
 # The end of the first sentence, in English and in Chinese; a dot after a space is a product.
 _FIRST_END = re.compile(r"(?<=[^\s.]\.) (?=\S)|(?<=。)")
 
@@ -124,7 +124,7 @@ def _symptom(fault: CodedFault, say: Say) -> Iterator[str]:
     else:
         (complaint, *_), name = failure.complaints, f'"{failure.case.name}"'
         text = sentence("Smallest failing case, {name}: {what}", name=name, what=complaint)
-        yield from (*wrapped(say(text), "  "), *numbers(failure, say, ROWS))
+        yield from (*wrapped(say(text), "  "), *numbers(failure, say))
 
 
 def failure_of(fault: CodedFault) -> CaseJudgement | None:

@@ -1,12 +1,11 @@
 """The screen of `verify`: a line a task, the mistakes, and what to do next."""
 
 import re
-import sys
 from collections.abc import Iterable, Sequence
 from itertools import groupby
 from typing import Any
 
-from rich.cells import cell_len, set_cell_size
+from rich.cells import cell_len
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -21,7 +20,6 @@ from .words import (
     VERDICTS,
     Presentation,
     advice,
-    causes,
     digits,
     explanations,
     introduction,
@@ -33,12 +31,7 @@ from .words import (
     title,
 )
 
-# Nothing is cut on an endless screen, such as a pipe.
-WIDTH, HEIGHT, ENDLESS = 80, 24, sys.maxsize
-# The most lines of the sentences about a task, and about its smallest failing case, unless a third
-# and an eighth of the screen are more. Beside mistakes, remarks get a twelfth of the screen.
-_EXPLANATION, _COMPLAINT = 6, 3
-_ELLIPSIS = " …"
+WIDTH = 80
 # The pieces between which a line may break: words, and single letters of scripts without spaces.
 _PIECE = re.compile(
     r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
@@ -51,31 +44,18 @@ _WIDEST = 10_000
 _PAPER = Console(**_PLAIN, width=_WIDEST, color_system=None, force_terminal=False)
 
 
-def lines(report: Report, context: Presentation, height: int = HEIGHT) -> list[str]:
-    """Return the screen, at most 80 columns wide and cut to about so many lines."""
+def lines(report: Report, context: Presentation) -> list[str]:
+    """Return the screen, at most 80 columns wide."""
     say = context.say
     bad = [task for task in report.tasks if task.verdict not in GOOD and not is_unwritten(task)]
-    screen = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
-    notes = paragraphs(remarks(report), say)
-    screen += _shorten(notes, height // 12) if bad else notes
-    end = wrapped(say(advice(report.tasks)))
     good = [task for task in report.tasks if task.verdict in GOOD and reservations(task)]
-    free = 0 if bad and height < ENDLESS else height - len(screen) - len(end) - 1
+    screen = [*wrapped(say(introduction(report))), *_table(report.tasks, say)]
+    screen += paragraphs(remarks(report), say)
     texts = set[str]()  # of the faults that are explained on the screen
     for task in good:
-        text = _summary(task, say, "  ", texts if height == ENDLESS else None)  # else it may be cut
-        screen += _shorten(text, max(_COMPLAINT, free // len(good)))
-    if bad and height < ENDLESS:
-        brief = [line for task in bad[1:] for line in _shorten(_summary(task, say), 2)]
-        room = height - len(screen) - len(end) - len(brief) - 2
-        screen += ["", *_details(bad[0], context, room), *brief]
-    else:
-        screen += _all_details(bad, context, height, texts)
-    if any(line.endswith(_ELLIPSIS) for line in screen):
-        hint = sentence("Cut at …: use --html FILE or | cat to see all of it.")
-        end = [*wrapped(say(hint)), *end]
-    whole = [*screen, "", *end] if len(screen) + len(end) < height else [*screen, *end]
-    return list(map(harmless, whole))
+        screen += _summary(task, say, texts)
+    screen += _all_details(bad, context, texts)
+    return list(map(harmless, [*screen, "", *wrapped(say(advice(report.tasks)))]))
 
 
 def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
@@ -101,70 +81,46 @@ def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> lis
     return [line.rstrip() for line in capture.get().splitlines()]
 
 
-def _summary(
-    task: TaskReport, say: Say, indent: str = "", texts: set[str] | None = None
-) -> list[str]:
-    """Return the name of a task and the sentences about its answers, each on a line of its own."""
-    failure, texts = task.smallest_failure, set[str]() if texts is None else texts
-    sentences = [*explanations(task), *failure.complaints] if failure else reservations(task)
-    whole = {say(words): words for words in sentences}
+def _summary(task: TaskReport, say: Say, texts: set[str]) -> list[str]:
+    """Return the name of a right task and its reservations, each on a line of its own."""
+    whole = {say(words): words for words in reservations(task)}
     parts = {text for text in whole for other in whole if text != other and text in other}
     words = [without_repetition(words, texts) for text, words in whole.items() if text not in parts]
-    new = list(dict.fromkeys(map(say, words)))
-    first, *others = [f"{title(task)}: " + "".join(new[:1]), *new[1:]]
-    return [*wrapped(first, indent), *(s for text in others for s in wrapped(text, f"{indent}  "))]
+    first, *others = dict.fromkeys(map(say, words))
+    rows = wrapped(f"{title(task)}: {first}", "  ")
+    return [*rows, *(row for text in others for row in wrapped(text, "    "))]
 
 
-def _all_details(
-    tasks: Sequence[TaskReport], context: Presentation, room: int, texts: set[str]
-) -> list[str]:
-    """Return the details of tasks, once for neighbours of which the same is said.
+def _all_details(tasks: Sequence[TaskReport], context: Presentation, texts: set[str]) -> list[str]:
+    """Return the details of tasks, once for neighbours with equal details.
 
     Faults whose texts stand on the screen are named by their codes.
     """
     screen = list[str]()
-    for _, group in groupby(tasks, key=lambda task: _details(task, context, room)[1:]):
+    for _, group in groupby(tasks, key=lambda task: _details(task, context, set())):
         same = list(group)
         heading = ", ".join(map(title, same))
-        screen += ["", *wrapped(f"{heading}:"), *_details(same[0], context, room, texts)[1:]]
+        screen += ["", *wrapped(f"{heading}:"), *_details(same[0], context, texts)]
     return screen
 
 
-def _details(
-    task: TaskReport, context: Presentation, room: int, texts: set[str] | None = None
-) -> list[str]:
-    """Return the mistakes of a task and its smallest failing case, in so many lines if possible."""
-    say, texts = context.say, set[str]() if texts is None else texts
-    failure, command = task.smallest_failure, context.command(task)
-    heading, why_limit = f"{title(task)}:", max(_EXPLANATION, room // 3)
+def _details(task: TaskReport, context: Presentation, texts: set[str]) -> list[str]:
+    """Return what answers show, the mistakes of a task, and its smallest failing cases."""
+    say, failure, command = context.say, task.smallest_failure, context.command(task)
     if failure is None:
-        return [heading, *_shorten(paragraphs(reservations(task), say, "  "), why_limit)]
+        return paragraphs(reservations(task), say, "  ")
     failures = smallest_failures(task.judgements, task.diagnosis.explained)
     # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint, last
     failures.sort(key=lambda other: other.verdict, reverse=True)
-    case = [
-        line
-        for other in failures
-        for line in _shorten(_failing(task, other, len(failures), say), max(_COMPLAINT, room // 8))
-    ]
-    rerun = []
+    words = [without_repetition(words, texts) for words in explanations(task)]
+    rows = paragraphs(words, say, "  ")
+    for other in failures:
+        rows += _failing(task, other, len(failures), say)
+    rows += numbers(failures[-1], say)
     if command:
         saved = sentence('The case "{name}" is saved. To run it again:', name=failure.case.name)
-        rerun = [*wrapped(say(saved), "  "), f"    {say(command)}"]
-    room -= 1 + len(case) + len(rerun)
-    why = _why(task, say, texts, max(2, min(why_limit, room - 3)))
-    rows = numbers(failures[-1], say, room - len(why) - 1)
-    return [heading, *why, *case, *rows, *rerun]
-
-
-def _why(task: TaskReport, say: Say, texts: set[str], limit: int) -> list[str]:
-    """Return what answers show and the causes, in so many lines; both keep half if cut."""
-    observed = paragraphs(task.diagnosis.observations, say, "  ")
-    words = [without_repetition(words, texts) for words in causes(task)]
-    why = paragraphs(words, say, "  ")
-    share = limit - min(len(why), limit // 2)
-    observed = _shorten(observed, share)
-    return [*observed, *_shorten(why, limit - len(observed))]
+        rows += [*wrapped(say(saved), "  "), f"    {say(command)}"]
+    return rows
 
 
 def _failing(task: TaskReport, failure: CaseJudgement, kinds: int, say: Say) -> list[str]:
@@ -190,10 +146,10 @@ def _failing(task: TaskReport, failure: CaseJudgement, kinds: int, say: Say) -> 
     )
 
 
-def numbers(failure: CaseJudgement, say: Say, limit: int) -> list[str]:
-    """Return a heading and rows of numbers side by side, in so many lines."""
-    rows = comparison.rows(failure, min(limit, 3))
-    if limit < 1 or not rows:
+def numbers(failure: CaseJudgement, say: Say) -> list[str]:
+    """Return a heading and rows of numbers side by side."""
+    rows = comparison.rows(failure)
+    if not rows:
         return []
     headings = say(sentence("yours")), say(sentence("expected"))
     columns = [("", *headings), *((row.label, *comparison.texts(row)) for row in rows)]
@@ -201,7 +157,7 @@ def numbers(failure: CaseJudgement, say: Say, limit: int) -> list[str]:
     if max(map(cell_len, grid)) + 4 > WIDTH:  # one side below the other
         stacked = [
             cells
-            for row in rows[: max(limit // 2, 1)]
+            for row in rows
             for cells in zip((row.label, ""), headings, comparison.texts(row), strict=True)
         ]
         grid = _grid(stacked, "lll")
@@ -232,19 +188,10 @@ def paragraphs(sentences: Iterable[Sentence], say: Say, indent: str = "") -> lis
     return [line for words in sentences for line in wrapped(say(words), indent)]
 
 
-def _shorten(text: list[str], limit: int) -> list[str]:
-    """Return at most so many lines; an ellipsis marks a cut."""
-    if len(text) <= limit:
-        return text
-    last = text[limit - 1]
-    return [*text[: limit - 1], set_cell_size(last, min(cell_len(last), WIDTH - 2)) + _ELLIPSIS]
-
-
 def show(report: Report, context: Presentation) -> None:
     """Print the screen, the verdicts in colour if the terminal has colours."""
     console = Console(**_PLAIN, soft_wrap=True)
-    height = max(HEIGHT, console.height) if console.is_terminal else ENDLESS
-    for line in lines(report, context, height):
+    for line in lines(report, context):
         text = Text(line)
         for verdict, words in VERDICTS.items():
             pattern = rf"(?<=  ){re.escape(context.say(words))}(?=  )"

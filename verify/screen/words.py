@@ -10,7 +10,7 @@ from plumbob.text.sentence import Say, Sentence, codes_in, sentence
 
 from ..connections import saved
 from ..exchange import Failure
-from ..judgement import LEAST_SHARE, CaseJudgement, Report, TaskReport, Verdict
+from ..judgement import CaseJudgement, Report, TaskReport, Verdict
 
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_EXCEPT)
 # In the answers of starters that nobody has filled in.
@@ -130,21 +130,14 @@ def is_unwritten(task: TaskReport) -> bool:
 
 
 def explanations(report: TaskReport) -> Iterator[Sentence]:
-    """Yield the observations on wrong answers, then the causes."""
-    yield from report.diagnosis.observations
-    yield from causes(report)
-
-
-def causes(report: TaskReport) -> Iterator[Sentence]:
-    """Yield explanations of wrong answers, nearest first, then the inferred behaviour and hints."""
+    """Yield observations on wrong answers, then causes, nearest first, behaviour and hints."""
     diagnosis = report.diagnosis
+    yield from diagnosis.observations
     for i, explanation in enumerate(diagnosis.explanations):
         yield sentence(
             "Or: {what} (explains {share:.0%} of the answers compared)"
-            if i and explanation.share >= LEAST_SHARE
-            else "{what} (explains {share:.0%} of the answers compared)"
-            if explanation.share >= LEAST_SHARE
-            else "The nearest known mistake explains only {share:.0%} of the answers: {what}",
+            if i
+            else "{what} (explains {share:.0%} of the answers compared)",
             what=explanation.sentence,
             share=explanation.share,
         )
