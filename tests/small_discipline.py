@@ -141,7 +141,7 @@ SMALL = {
 
 
 def use_small_disciplines(patch):
-    """Judge by these disciplines alone, without a search of lines; wrong answers show a sentence."""
+    """Judge by these disciplines alone, without a search; wrong answers show one sentence."""
     module = sys.modules["plumbob.verify.verify"]
 
     def observe(connection, report, seed):

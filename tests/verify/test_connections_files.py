@@ -1,27 +1,20 @@
 """Laws of the folder of cases and of the answers beside them."""
 
-import csv
 import json
 import tomllib
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from hypothesis.extra import numpy as arrays
 
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.connections import export, open_connection
 from plumbob.verify.connections.export import export_cases, write_cases
 from plumbob.verify.connections.files import FileConnection, place_of
-from plumbob.verify.connections.tables import read_table, write_table
-from plumbob.verify.exchange import Answer, FailureKind, NoGreetingError
+from plumbob.verify.exchange import FailureKind, NoGreetingError
 from plumbob.verify.greeting import Greeting
-from plumbob.verify.task import TASKS, Field
-
-TABLE = Field("positions", ("frame", "particle", 3))
+from plumbob.verify.task import TASKS
 
 
 def chain(name="two joints", **more):
@@ -48,7 +41,7 @@ def folder(tmp_path):
     return tmp_path / "cases"
 
 
-def test_a_folder_holds_every_case_as_json_and_csv(folder):
+def test_a_folder_holds_every_case_as_json(folder):
     places = (folder / "cases.txt").read_text(encoding="utf-8").splitlines()
     assert places == [place_of(case) for case in CASES]
     assert places[1:] == [
@@ -59,16 +52,7 @@ def test_a_folder_holds_every_case_as_json_and_csv(folder):
     for place, case in zip(places, CASES, strict=True):
         request = json.loads((folder / place / "request.json").read_text(encoding="utf-8"))
         assert request.keys() == {"id", "task", *case.inputs}
-        assert {path.stem for path in (folder / place).glob("*.csv")} == case.inputs.keys()
-    assert (folder / places[2] / "method.csv").read_text(encoding="utf-8") == "ccd\n"
-    assert (folder / places[2] / "effector.csv").read_text(encoding="utf-8") == "1\n"
-    assert (folder / places[2] / "parents.csv").read_text(encoding="utf-8") == "-1\n0\n"
-
-
-def test_the_tables_of_a_case_are_what_a_csv_reader_reads(folder):
-    with open(folder / place_of(CASES[0]) / "offsets.csv", encoding="utf-8") as file:
-        rows = [[float(cell) for cell in row] for row in csv.reader(file)]
-    np.testing.assert_array_equal(rows, CASES[0].inputs["offsets"])
+        np.testing.assert_array_equal(np.array(request["parents"]), case.inputs["parents"])
 
 
 def test_the_readme_names_every_file_and_output(folder):
@@ -76,7 +60,7 @@ def test_the_readme_names_every_file_and_output(folder):
     for task in ("forward_kinematics", "inverse_kinematics"):
         assert all(field.name in words for field in (*TASKS[task].inputs, *TASKS[task].outputs))
     assert "mass_spring_step" not in words
-    for name in ("cases.txt", "request.json", "answer.json", "greeting.json", "answer_"):
+    for name in ("cases.txt", "request.json", "answer.json", "greeting.json"):
         assert name in words
 
 
@@ -86,7 +70,7 @@ def test_a_folder_without_answers_says_what_to_write(folder):
     assert (connection.seed, connection.thorough) == (3, False)
     failure = connection.answer(CASES[0])
     assert failure.kind is FailureKind.ABSENT
-    assert "expected answer.json or answer_positions.csv or" in str(failure.sentence)
+    assert "expected answer.json" in str(failure.sentence)
 
 
 @pytest.mark.parametrize(
@@ -135,33 +119,6 @@ def test_answers_in_json_are_read_each_time_the_same(folder, name):
 
 
 DATA = tomllib.loads(Path(__file__).with_name("answer_files.toml").read_text("utf-8"))
-ENCODINGS = ["utf-8", "utf-8-sig", "utf-16"]
-
-
-@pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("name", DATA["csv"])
-def test_answers_in_csv_are_understood(folder, name, encoding):
-    place = folder / place_of(CASES[0])
-    (place / "answer_positions.csv").write_bytes(DATA["csv"][name].encode(encoding))
-    answer = FileConnection(folder).answer(CASES[0])
-    assert isinstance(answer, Answer), answer.sentence
-    np.testing.assert_array_equal(answer.values["positions"], POSITIONS)
-    assert answer.seconds == 0.0
-
-
-WRONG_TABLES = [
-    *DATA["wrong_table"],
-    {"data": "\udcff\0", "words": "expected a text file in UTF-8"},
-]
-
-
-@pytest.mark.parametrize("row", WRONG_TABLES, ids=lambda row: row["words"])
-def test_tables_that_are_not_understood_say_where(folder, row):
-    data = row["data"].encode(errors="surrogateescape")
-    (folder / place_of(CASES[0]) / "answer_positions.csv").write_bytes(data)
-    failure = FileConnection(folder).answer(CASES[0])
-    assert failure.kind is FailureKind.GARBAGE
-    assert f"positions: {row['words']}" in str(failure.sentence)
 
 
 @pytest.mark.parametrize("row", DATA["wrong_json"], ids=lambda row: row["words"])
@@ -172,7 +129,7 @@ def test_json_that_is_not_understood_says_why(folder, row):
     assert row["words"] in str(failure.sentence)
 
 
-@pytest.mark.parametrize("name", ["answers.json", "answer_position.csv", "Answer.JSON"])
+@pytest.mark.parametrize("name", ["answers.json", "answer.jsn", "Answer.JSON"])
 def test_a_file_beside_its_name_is_named(folder, name):
     (folder / place_of(CASES[0]) / name).write_text("1,2,3", encoding="utf-8")
     failure = FileConnection(folder).answer(CASES[0])
@@ -235,28 +192,3 @@ def test_a_greeting_that_is_not_understood_says_so(folder):
     (folder / "greeting.json").write_text('{"protocol": 1, "tasks": ["x"]}')
     with pytest.raises(NoGreetingError, match=r"greeting\.json: tasks: expected one of"):
         _ = FileConnection(folder).greeting
-
-
-@given(arrays.arrays(np.float64, (2, 4, 3), elements=st.floats()))
-def test_tables_hold_every_double(array):
-    found = read_table(TABLE, {"particle": 4}, write_table(array).encode())
-    np.testing.assert_array_equal(found, array)
-    assert (np.signbit(found) == np.signbit(array))[~np.isnan(array)].all()
-
-
-@pytest.mark.parametrize("frames", [0, 1, 5])
-def test_frames_need_not_be_announced(frames):
-    array = np.random.default_rng(1).random((frames, 4, 3))
-    for rows in (array.reshape(-1, 3), array.reshape(frames, 12), array.reshape(-1, 1)):
-        found = read_table(TABLE, {"particle": 4}, write_table(rows).encode())
-        np.testing.assert_array_equal(found, array)
-
-
-@pytest.mark.parametrize(("text", "value"), [("2.5\n", 2.5), ("2,5", 2.5), ("x\n2.5", 2.5)])
-def test_a_single_number_is_a_file_of_one(text, value):
-    assert read_table(Field("residual", ()), {}, text.encode()) == value
-
-
-@pytest.mark.parametrize(("text", "value"), [("1", True), ("true", True), ("False", False)])
-def test_a_boolean_is_a_word_or_a_digit(text, value):
-    assert read_table(Field("converged", (), "boolean"), {}, text.encode()) is value

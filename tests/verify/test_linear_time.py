@@ -16,11 +16,6 @@ SIZE = 1 << 20
 
 READERS = {
     "message": "from plumbob.verify.message import decode_object as read",
-    "table": """
-from plumbob.verify.connections.tables import read_table
-from plumbob.verify.task import TASKS
-read = lambda text: read_table(TASKS["resample"].outputs[0], {}, text)
-""",
     "model": """
 import pathlib, tempfile
 from plumbob.crosscheck.engines.file_kind import file_kind
@@ -48,12 +43,6 @@ TEXTS = {
         "decimals": (b'{"id": 1, "a": [nan, 1.', b"9", b"]}"),
         "beginnings of objects": (b"print ", b"{ ", b""),
         "spaces": (b'{"id": 1, "a": [nan', b" ", b"]"),
-    },
-    "table": {
-        "cells": (b"", b";,\t ", b"a"),
-        "a word": (b"nan(", b"a", b""),
-        "digits": (b"1.", b"1", b",a,3"),
-        "lines": (b"", b"\n", b"a"),
     },
     "model": {
         "spaces": (b"", b" ", b""),

@@ -13,7 +13,6 @@ from ..greeting import Greeting
 from ..task import TASKS, Task
 from ..verify import trials
 from .files import GREETING, REQUEST, SETTINGS, place_of, read_greeting
-from .tables import write_table
 
 README = Path(__file__).with_name("export_readme.txt").read_text(encoding="utf-8")
 
@@ -60,9 +59,6 @@ def write_cases(
     }
     for number, (place, case) in enumerate(places.items(), 1):
         texts[f"{place}/{REQUEST}"] = message.encode_case(number, case).decode()
-        for name, values in case.inputs.items():
-            if values is not None:
-                texts[f"{place}/{name}.csv"] = write_table(values)
     for name, text in texts.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text, encoding="utf-8")

@@ -15,13 +15,10 @@ from .. import message
 from ..case import Case
 from ..exchange import Answer, Failure, FailureKind, NoGreetingError
 from ..greeting import Greeting
-from ..task import TASKS, Task
+from ..task import TASKS
 from .losses import LIMITS
-from .tables import read_table
 
 GREETING, SETTINGS, REQUEST, ANSWER = "greeting.json", "export.json", "request.json", "answer.json"
-# Some outputs have the names of inputs; so the tables of an answer have a prefix.
-PREFIX = "answer_"
 # A solver's own time is less: thirty years [s].
 LONGEST = 1e9
 
@@ -49,7 +46,10 @@ def read_greeting(folder: Path) -> Greeting:
 
 def _object(path: Path) -> dict[str, Any]:
     """Return the JSON object of a file; raise ValueError if it holds something else."""
-    content = _content(path)
+    # The host of Python solvers never needs this.
+    from plumbob.reference.formats.source import read_bytes
+
+    content = read_bytes(path, largest=LIMITS.line)
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         content = content.decode("utf-16", errors="replace").encode()
     fields = message.decode_object(content)
@@ -57,18 +57,6 @@ def _object(path: Path) -> dict[str, Any]:
         text = one_line(content, 60)
         raise ValueError(f"{path.name}: expected a JSON object, got {text!r}")
     return fields
-
-
-def _content(path: Path) -> bytes:
-    # The host of Python solvers never needs this.
-    from plumbob.reference.formats.source import read_bytes
-
-    return read_bytes(path, largest=LIMITS.line)
-
-
-def _exported(task: Task) -> set[str]:
-    """Return the names of the files that an export writes for a case."""
-    return {REQUEST, *(f"{definition.name}.csv" for definition in task.inputs)}
 
 
 class FileConnection:
@@ -117,7 +105,7 @@ class FileConnection:
     def _has_answers(self, task: str, method: str) -> bool:
         """Return whether a file stands beside the cases of a task that was not exported."""
         files = (self.folder / _folder(task, method)).glob("*/[!.]*")
-        return any(path.name not in _exported(TASKS[task]) for path in files)
+        return any(path.name != REQUEST for path in files)
 
     def _offered(self) -> Greeting:
         try:
@@ -149,32 +137,21 @@ def _is_current(path: Path, case: Case) -> bool:
 
 
 def _read_answer(place: Path, case: Case) -> Answer | Failure:
-    """Return the answer in answer.json or in the tables; raise ValueError if it is invalid."""
-    task = TASKS[case.task]
-    counts = task.counts(case.inputs)
-    if (place / ANSWER).is_file():
-        fields = _object(place / ANSWER)
-    else:
-        paths = {place / f"{PREFIX}{output.name}.csv": output for output in task.outputs}
-        tables = {path: output for path, output in paths.items() if path.is_file()}
-        fields = {o.name: read_table(o, counts, _content(path)) for path, o in tables.items()}
-    if not fields:
-        return Failure(FailureKind.ABSENT, _absent(place, task))
-    answer = message.decode_answer(fields, task, case.inputs, LONGEST)
+    """Return the answer in answer.json; raise ValueError if it is invalid."""
+    if not (place / ANSWER).is_file():
+        return Failure(FailureKind.ABSENT, _absent(place))
+    answer = message.decode_answer(_object(place / ANSWER), TASKS[case.task], case.inputs, LONGEST)
     if isinstance(answer, Answer) and answer.untimed:
         untimed = sentence('Not timed: the answers hold no valid "seconds".')
         return replace(answer, seconds=0.0, untimed=untimed)
     return answer
 
 
-def _absent(place: Path, task: Task) -> Sentence:
+def _absent(place: Path) -> Sentence:
     """Return that there is no answer, and which file was perhaps meant as an answer."""
-    names = [ANSWER, *(f"{PREFIX}{output.name}.csv" for output in task.outputs)]
-    for file in sorted({path.name for path in place.iterdir()} - _exported(task)):
-        if near := did_you_mean(file, names):
+    for file in sorted({path.name for path in place.iterdir()} - {REQUEST}):
+        if near := did_you_mean(file, [ANSWER]):
             return sentence(
                 "There is no answer in {place}, but {file}{near}", place=place, file=file, near=near
             )
-    return sentence(
-        "There is no answer in {place}: expected {names}", place=place, names=" or ".join(names)
-    )
+    return sentence("There is no answer in {place}: expected {name}", place=place, name=ANSWER)
