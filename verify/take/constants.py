@@ -11,18 +11,15 @@ from ..case import Case
 from ..exchange import Answer, Connection, Exchange
 from ..gaps import largest_gap
 from ..greeting import Fixed
-from ..judgement import TaskReport, Verdict
+from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics import problems
 from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import solve
 from ..kinematics.rounding import STALL
 from ..kinematics.sweeps import PoseTrial
 from ..kinematics.textbook import SOLVERS, Choices
+from .examination import SAME, TRIALS, outputs_of
 
-# The requests in which an input is changed; all answers must stay the same.
-TRIALS = 3
-# Answers that differ by less are the same, in any unit.
-SAME = 1e-12
 # What a program may say of a solve by an input that does not change the pose.
 CLAIMS = {"residual", "iterations", "converged"}
 # What two requests hold that differ in an input, with which right answers change.
@@ -53,25 +50,22 @@ class Constant(NamedTuple):
 
 def is_unread(connection: Connection, report: TaskReport, name: str) -> bool:
     """Return whether the largest requests get the same answers with two values of an input."""
-    cases = [
-        judgement.case
-        for judgement in report.judgements
-        if judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
-        if not {"sweeps", "of"} & {*judgement.case.facts}
-    ]
+    cases = [j.case for j in _unlimited(report) if not {"sweeps", "of"} & {*j.case.facts}]
     first, second = CHANGES[name]
     for case in sorted(cases, key=lambda case: -case.size)[:TRIALS]:
-        one, other = (_outputs(connection, case, {**first, **change}) for change in (first, second))
+        one, other = (
+            outputs_of(connection, case, {**first, **change}) for change in (first, second)
+        )
         names = one.keys() - CLAIMS
         if not names or any(largest_gap(one[n], other.get(n, np.inf)) > SAME for n in names):
             return False
     return bool(cases)
 
 
-def _outputs(connection: Connection, case: Case, change: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the outputs of the answer to a changed request, {} without an answer."""
-    answer = connection.answer(replace(case, inputs={**case.inputs, **change}))
-    return answer.values if isinstance(answer, Answer) else {}
+def _unlimited(report: TaskReport) -> list[CaseJudgement]:
+    """Return the judgements of cases without limits of joints that have to be answered."""
+    judgements = (j for j in report.judgements if j.case.requirement == "must")
+    return [j for j in judgements if "cones" not in j.case.inputs]
 
 
 def tolerance(connection: Connection, report: TaskReport) -> Constant | None:
@@ -84,8 +78,7 @@ def tolerance(connection: Connection, report: TaskReport) -> Constant | None:
         return None
     ends = [
         (finding, judgement.case.facts)
-        for judgement in report.judgements
-        if judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
+        for judgement in _unlimited(report)
         for finding in judgement.findings
         if finding.law == "target reached"
     ]
@@ -110,13 +103,12 @@ def _round_bound(ends: Sequence[float]) -> float:
 def _ends_of_smaller(connection: Connection, report: TaskReport) -> list[float]:
     """Return the distances at which solves of smaller skeletons end [m], () of tracks."""
     distances = []
-    for case in (judgement.case for judgement in report.judgements):
-        is_solve = "target" in case.inputs and "sweeps" not in case.facts
-        if not is_solve or case.requirement != "must" or "cones" in case.inputs:
+    for case in (judgement.case for judgement in _unlimited(report)):
+        if "target" not in case.inputs or "sweeps" in case.facts:
             continue
         lengths = {name: SCALE * case.inputs[name] for name in ("offsets", "target")}
         inputs = {**case.inputs, **lengths}
-        outputs = _outputs(connection, case, lengths)
+        outputs = outputs_of(connection, case, lengths)
         distance = read_pose(outputs, inputs, case.facts).distance
         distances += [distance] if case.facts["least"] == 0.0 and distance > 0.0 else []
     return [distance for distance in distances if distance <= FARTHEST]
@@ -160,7 +152,7 @@ def _exchange(connection: Connection, report: TaskReport, case: Case) -> Exchang
     inputs = {**case.inputs, "method": report.method}
     if report.task == "track":
         inputs["curve"] = inputs.pop("target")[None]
-    outputs = _outputs(connection, replace(case, task=report.task, inputs=inputs), {})
+    outputs = outputs_of(connection, replace(case, task=report.task, inputs=inputs), {})
     frame = 0 if report.task == "track" else slice(None)
     answer = Answer({name: outputs[name][frame] for name in outputs.keys() - CLAIMS}, 0.0)
     return Exchange(case, answer, answer)
@@ -175,14 +167,19 @@ def _gaps(trial: PoseTrial, method: str, root_first: bool) -> list[float]:
     return gaps
 
 
+def _flight(report: TaskReport) -> Case | None:
+    """Return the case of a free particle, None if there is none."""
+    return next((j.case for j in report.judgements if j.case.family == "flight"), None)
+
+
 def gravity(connection: Connection, report: TaskReport) -> Constant | None:
     """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
-    case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
+    case = _flight(report)
     if case is None:
         return None
     x, masses, h = (case.inputs.get(name, 1.0) for name in ("positions", "masses", "h"))
     at_rest = {"velocities": np.zeros_like(x)}
-    outputs = _outputs(connection, case, at_rest)
+    outputs = outputs_of(connection, case, at_rest)
     if "forces" in outputs:
         g = outputs["forces"][0] / masses[0]
     elif "velocities" in outputs:
@@ -190,7 +187,7 @@ def gravity(connection: Connection, report: TaskReport) -> Constant | None:
     elif "positions" in outputs:
         g = (outputs["positions"].reshape(-1, *x.shape)[0, 0] - x[0]) / h**2
     elif name := next((name for name in ENERGIES if name in outputs), None):
-        lifted = (_outputs(connection, case, at_rest | {"positions": x + e}) for e in np.eye(3))
+        lifted = (outputs_of(connection, case, at_rest | {"positions": x + e}) for e in np.eye(3))
         g = [(outputs[name] - other.get(name, np.nan)) / masses.sum() for other in lifted]
     else:
         return None
@@ -202,12 +199,12 @@ def gravity(connection: Connection, report: TaskReport) -> Constant | None:
 
 def step_length(connection: Connection, report: TaskReport) -> Constant | None:
     """Return by how much a free particle moves for 1 m/s more [s], None if answers do not tell."""
-    case = next((j.case for j in report.judgements if j.case.family == "flight"), None)
+    case = _flight(report)
     if case is None:
         return None
     x = case.inputs["positions"]
     answers = [
-        _outputs(connection, case, {"velocities": np.full_like(x, speed)}) for speed in (0.0, 1.0)
+        outputs_of(connection, case, {"velocities": np.full_like(x, speed)}) for speed in (0.0, 1.0)
     ]
     if not all("positions" in answer for answer in answers):
         return None

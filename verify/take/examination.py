@@ -1,11 +1,18 @@
 """What examiners of a report may use: the solver, and the judgement by another greeting."""
 
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, Protocol
 
-from ..exchange import Connection, Exchange
+from ..case import Case
+from ..exchange import Answer, Connection, Exchange
 from ..greeting import Greeting
-from ..judgement import TaskReport
+from ..judgement import CaseJudgement, TaskReport, Verdict
+
+# The most requests in which an input is changed.
+TRIALS = 3
+# Answers that differ by less are the same, in any unit.
+SAME = 1e-12
 
 
 class Examination(Protocol):
@@ -21,3 +28,15 @@ class Examination(Protocol):
 
 # An examiner returns the report with what it finds, or the same report.
 Examiner = Callable[[Examination, TaskReport], TaskReport]
+
+
+def outputs_of(connection: Connection, case: Case, change: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Return the outputs of the answer to a changed request, {} without an answer."""
+    answer = connection.answer(replace(case, inputs={**case.inputs, **change}))
+    return answer.values if isinstance(answer, Answer) else {}
+
+
+def is_steady(judgement: CaseJudgement) -> bool:
+    """Return whether equal requests got equal answers."""
+    laws = {finding.law for finding in judgement.findings if finding.verdict >= Verdict.WRONG}
+    return "equal answers" not in laws

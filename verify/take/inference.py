@@ -27,12 +27,8 @@ from ..kinematics.robot_models import urdf
 from ..task import TASKS
 from . import precision
 from .constants import MEASURES, is_unread
-from .examination import Examination
+from .examination import SAME, TRIALS, Examination
 
-# The largest requests in which an input is changed; all answers must stay the same.
-TRIALS = 3
-# Answers that differ by less are the same, in any unit.
-SAME = 1e-12
 UNRELATED = sentence("it gives no answer otherwise")
 # What is judged by where answers do not show the number itself.
 WITHOUT_NUMBER: Mapping[str, Sentence] = {

@@ -10,7 +10,7 @@ from plumbob.text.sentence import Sentence, with_code
 from ..exchange import Answer, Connection, is_hung
 from ..gaps import difference
 from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
-from .examination import Examination
+from .examination import Examination, is_steady
 
 NAME = "state kept between requests"
 FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]
@@ -31,7 +31,12 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
     if report.verdict < Verdict.WRONG or connection.greeting.system.continues or is_stuck:
         return report
-    wrong = [judgement for judgement in report.judgements if _is_steady(judgement)]
+    wrong = [
+        judgement
+        for judgement in report.judgements
+        if isinstance(judgement.answer, Answer) and judgement.verdict >= Verdict.WRONG
+        if is_steady(judgement)
+    ]
     share = _changed_share(connection, wrong[-REQUESTS:])
     if not share:
         return report
@@ -42,12 +47,6 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         report.diagnosis, explanations=explanations, first_broken=None, is_certain=is_certain
     )
     return replace(report, diagnosis=diagnosis)
-
-
-def _is_steady(judgement: CaseJudgement) -> bool:
-    """Return whether an answer is wrong, and the same if the request is repeated."""
-    laws = {finding.law for finding in judgement.findings if finding.verdict >= Verdict.WRONG}
-    return isinstance(judgement.answer, Answer) and bool(laws) and "equal answers" not in laws
 
 
 def _changed_share(connection: Connection, judgements: Sequence[CaseJudgement]) -> float:

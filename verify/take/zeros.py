@@ -8,17 +8,16 @@ import numpy as np
 
 from plumbob.text.sentence import sentence
 
-from ..exchange import Answer, Connection, is_hung
+from ..exchange import Connection, is_hung
 from ..gaps import largest_gap
 from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
-from .examination import Examination
+from .examination import TRIALS, Examination, is_steady, outputs_of
 
 # Inputs of springs that may be zero.
 NAMES = ("stiffnesses", "dampings")
 # Almost zero. Right answers change by about this share of what 1 in its place changes, other ones
 # by as much as another number does.
 ALMOST, JUMP = 1e-6, 1e-2
-TRIALS = 3
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
@@ -26,7 +25,7 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     wrong = [j for j in report.judgements if j.verdict >= Verdict.UNDECIDED]
     if report.verdict < Verdict.UNDECIDED or report.original is not None:
         return report
-    if any(is_hung(j.answer) or not _is_steady(j) for j in wrong):
+    if any(is_hung(j.answer) or not is_steady(j) for j in wrong):
         return report
     for name in NAMES:
         concerned = [j for j in wrong if _has_zeros(j, name)]
@@ -47,12 +46,6 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     return report
 
 
-def _is_steady(judgement: CaseJudgement) -> bool:
-    """Return whether equal requests got equal answers."""
-    laws = {finding.law for finding in judgement.findings if finding.verdict >= Verdict.WRONG}
-    return "equal answers" not in laws
-
-
 def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
     values = judgement.case.inputs.get(name)
     return values is not None and np.size(values) > 0 and not np.all(values)
@@ -64,7 +57,7 @@ def _jumps(connection: Connection, judgements: Sequence[CaseJudgement], name: st
     for judgement in judgements:
         values = np.asarray(judgement.case.inputs[name])
         zero, almost, other = (
-            _outputs(connection, judgement, {name: np.where(values == 0.0, number, values)})
+            outputs_of(connection, judgement.case, {name: np.where(values == 0.0, number, values)})
             for number in (0.0, ALMOST, 1.0)
         )
         jump, change = _gap(almost, zero), _gap(almost, other)
@@ -76,14 +69,6 @@ def _jumps(connection: Connection, judgements: Sequence[CaseJudgement], name: st
         if count == TRIALS:
             break
     return count > 0
-
-
-def _outputs(
-    connection: Connection, judgement: CaseJudgement, change: Mapping[str, Any]
-) -> Mapping[str, Any]:
-    case = replace(judgement.case, inputs={**judgement.case.inputs, **change})
-    answer = connection.answer(case)
-    return answer.values if isinstance(answer, Answer) else {}
 
 
 def _gap(first: Mapping[str, Any], second: Mapping[str, Any]) -> float:
