@@ -1,6 +1,6 @@
 """Equalities that all answers have and right answers have not."""
 
-from collections.abc import Iterator, Set
+from collections.abc import Set
 from typing import Any
 
 import numpy as np
@@ -31,18 +31,19 @@ class Equalities:
 
     def strongest(self) -> list[Statement]:
         """Return the equality that most right answers do not have, if there is any."""
-        return sorted(self.statements(), key=lambda statement: statement.score)[:1]
+        statements = filter(None, map(self.statement, self._cases))
+        return sorted(statements, key=lambda statement: statement.score)[:1]
 
-    def statements(self) -> Iterator[Statement]:
-        """Yield the equalities of all answers that right answers do not have in enough cases."""
-        for name, cases in self._cases.items():
-            count, different = len(cases), sum(differs for _, differs in cases.values())
-            if different >= MIN_CASES and all(holds for holds, _ in cases.values()):
-                words = sentence(
-                    "{equality}: in all {count} answers that tell, and in {others} of the right "
-                    "answers.",
-                    count=count,
-                    equality=words_of("equality", name),
-                    others=count - different,
-                )
-                yield Statement(-float(different), words, is_exact=True)
+    def statement(self, name: str) -> Statement | None:
+        """Return an equality of all answers that enough right answers do not have, else None."""
+        cases = self._cases.get(name, {})
+        count, different = len(cases), sum(differs for _, differs in cases.values())
+        if different < MIN_CASES or not all(holds for holds, _ in cases.values()):
+            return None
+        words = sentence(
+            "{equality}: in all {count} answers that tell, and in {others} of the right answers.",
+            count=count,
+            equality=words_of("equality", name),
+            others=count - different,
+        )
+        return Statement(-float(different), words, is_exact=True)

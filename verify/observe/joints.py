@@ -12,6 +12,7 @@ import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray, IndexArray
+from plumbob.text.sentence import sentence
 
 from ..exchange import Answer
 from ..judgement import CaseJudgement, TaskReport, Verdict
@@ -19,11 +20,16 @@ from ..kinematics.pose_laws import read_pose
 from ..kinematics.predictions import forward, solve
 from ..kinematics.textbook import SOLVERS
 from .equalities import Equalities
-from .separation import TOLERANCE, ElementTable, Findings
+from .separation import BETWEEN, MIN_CASES, TOLERANCE, ElementTable, Findings, Statement
 
 # Rotations by less count as none [rad]: the sine of half the angle is then about rounding.
 UNROTATED = 1e-7
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
+# By what the angles of rotations in a sweep of CCD may be multiplied.
+FACTORS = {
+    "half_turn": 0.5, "double_turn": 2.0, "turn_in_degrees": 180.0 / np.pi,
+    "turn_in_radians": np.pi / 180.0,
+}  # fmt: skip
 
 
 def sound_cases(judgements: Sequence[CaseJudgement]) -> frozenset[str]:
@@ -93,10 +99,10 @@ def forward_evidence(judgements: Sequence[CaseJudgement]) -> Findings:
     """
     sound = sound_cases(judgements)
     tables = {name: ElementTable(name, sound) for name in ("rotation", "position")}
-    equalities = Equalities(sound)
-    for judgement in judgements:
-        _add_forward(ForwardPose(judgement), tables, equalities)
-    return Findings(tables, equalities.strongest(), [])
+    equalities, poses = Equalities(sound), list(map(ForwardPose, judgements))
+    for pose in poses:
+        _add_forward(pose, tables, equalities)
+    return Findings(tables, [*equalities.strongest(), *_other_parents(poses)], [])
 
 
 class ForwardPose:
@@ -110,8 +116,26 @@ class ForwardPose:
         self.offsets, self.local = self.inputs["offsets"], self.inputs["local_rotations"]
         self.positions, self.raw = outputs.get("positions"), outputs.get("rotations")
         unit = _unit(self.right if self.raw is None else self.raw)
-        rotations = np.where(np.isfinite(unit), unit, self.right)
-        self.above = _of_parents(rotations, self.parents, IDENTITY)
+        self.rotations = np.where(np.isfinite(unit), unit, self.right)
+        self.above = _of_parents(self.rotations, self.parents, IDENTITY)
+
+    @property
+    def wrong(self) -> BoolArray:
+        """Which joints do not have the pose that follows from the answer for their parent."""
+        if self.positions is None or self.raw is None:
+            return np.zeros(len(self.parents), dtype=bool)
+        links = self.positions - _of_parents(self.positions, self.parents, 0.0)
+        gaps = np.abs(links - rotation.rotate(self.above, self.offsets)).max(axis=1)
+        turns = angles(self.raw, rotation.multiply(self.above, self.local))
+        return ~(np.maximum(gaps / _size(self.offsets), turns) <= BETWEEN * TOLERANCE)
+
+    def carriers(self, joint: int) -> IndexArray:
+        """Return the joints from whose answered pose that of a joint follows."""
+        R = self.rotations
+        gaps = self.positions + rotation.rotate(R, self.offsets[joint]) - self.positions[joint]
+        turns = angles(self.raw[joint], rotation.multiply(R, self.local[joint]))
+        gap = np.maximum(np.abs(gaps).max(axis=1) / _size(self.offsets), turns)
+        return np.flatnonzero((gap <= TOLERANCE) & (np.arange(len(R)) != joint))
 
 
 def _add_forward(
@@ -164,6 +188,24 @@ def _add_frames(pose: ForwardPose, links: FloatArray, equalities: Equalities) ->
         equalities.add(key, pose.name, *gaps)
 
 
+def _other_parents(poses: Sequence[ForwardPose]) -> list[Statement]:
+    """Return that each wrong joint hangs from another joint than its parent, [] if not so."""
+    hanging = [
+        (pose, j, pose.carriers(j)) for pose in poses for j in map(int, np.flatnonzero(pose.wrong))
+    ]
+    cases = {pose.name for pose, _, _ in hanging}
+    if len(cases) < MIN_CASES or not all(len(joints) for _, _, joints in hanging):
+        return []
+    pose, joint, joints = hanging[0]
+    words = sentence(
+        "Every wrong joint hangs from another joint than its parent ({count}): in the case "
+        "'{case}' joint {joint} hangs from joint {other} and not from joint {parent}.",
+        count=len(hanging), case=pose.name, joint=joint, other=int(joints[0]),
+        parent=int(pose.parents[joint]),
+    )  # fmt: skip
+    return [Statement(-float(len(cases)), words, is_exact=True)]
+
+
 # Inverse kinematics
 
 
@@ -175,7 +217,8 @@ def inverse_evidence(
     If `max_iterations` is unread, no answer is that of one sweep.
     """
     method, reads_sweeps = _method(report), "max_iterations" not in unread
-    sound, of_cases = sound_cases(judgements), ("root_position", "pose")
+    sound = sound_cases(judgements)
+    of_cases = "root_position", "pose", "end", "approach"
     names = ("agreement", "unmoved", "length", "turn", "point", *of_cases)
     tables = {name: ElementTable(name, sound, is_of_cases=name in of_cases) for name in names}
     equalities = Equalities(sound)
@@ -183,11 +226,16 @@ def inverse_evidence(
         pose = SolvedPose(judgement, method, tables, equalities)
         if pose.answer.finite:
             pose.add()
+            pose.add_end()
         if pose.answer.finite and reads_sweeps:
             pose.add_sweeps()
-    if any(tables[name].is_wrong_everywhere for name in ("turn", "point")):
+    if any(tables[name].is_wrong_everywhere for name in ("turn", "point", "root_position")):
         del tables["pose"]  # which is then wrong as well
-    return Findings(tables, equalities.strongest(), [])
+    at_origin = equalities.statement("root_at_origin")
+    if at_origin is None:
+        return Findings(tables, equalities.strongest(), [])
+    del tables["root_position"]  # all else is judged with the root where it is
+    return Findings(tables, [at_origin], [], is_more_wrong=True)
 
 
 def _method(report: TaskReport) -> str:
@@ -218,6 +266,7 @@ class SolvedPose:
         assert isinstance(judgement.answer, Answer)
         case = judgement.case
         self.name, self.inputs, self.method = case.name, case.inputs, method
+        self.facts = case.facts
         self.tables, self.equalities = tables, equalities
         self.parents, self.offsets = np.asarray(case.inputs["parents"]), case.inputs["offsets"]
         self.start, self.size = case.inputs["local_rotations"], _size(self.offsets)
@@ -239,6 +288,17 @@ class SolvedPose:
             self._add_links(x)
         if self.local is not None:
             self._add_rotations(self.local)
+
+    def add_end(self) -> None:
+        """Add the distance from the target: after whole solves, and after sweeps of a method."""
+        facts, allowed = self.facts, self.inputs["tolerance"] / self.size + TOLERANCE
+        if "sweeps" not in facts:
+            excess = (self.answer.distance - facts["least"]) / self.size
+            features = {"beyond_reach": facts["least"] > 0.0, "one_link": len(self.path) == 2}
+            self.tables["end"].add(self.name, excess, features, allowed)
+        elif self.method:
+            growth = (self.answer.distance - facts["before"]) / self.size
+            self.tables["approach"].add(self.name, growth, self._whole())
 
     def add_sweeps(self) -> None:
         """Add the pose after all sweeps, and what a single sweep shows, which no tolerance ends."""
@@ -314,7 +374,10 @@ class SolvedPose:
         }
         self.tables["turn"].add(self.name, angles(local[joints], due), places)
         miss = angles(rotation.between(rotation.rotate(after, ends), to_target), IDENTITY)
-        self.equalities.add("half_turn", self.name, np.abs(turned - need / 2.0), need / 2.0)
+        for key, factor in FACTORS.items():
+            due_angles = np.abs(np.remainder(factor * need + np.pi, 2.0 * np.pi) - np.pi)
+            gaps = np.abs(turned - due_angles) / max(factor, 1.0)  # which enlarges rounding
+            self.equalities.add(key, self.name, gaps, np.abs(due_angles - need))
         self.equalities.add("wrong_axis", self.name, np.abs(turned - need), miss)
 
     def _ends(self, local: FloatArray) -> FloatArray:

@@ -102,7 +102,8 @@ def sentences(
     evidence = _evidence(report, judgements, greeting, unread)
     tables, equations = list(evidence.tables.values()), sorted(evidence.statements, key=_score)
     # the places say more than the statements before if they are exact
-    places = [place for place in of_tables(tables) if place.is_exact or not equations]
+    is_vague_told = evidence.is_more_wrong or not equations
+    places = [place for place in of_tables(tables) if place.is_exact or is_vague_told]
     first = [inputs.statement_of(unread)] if unread else []
     words = [statement.sentence for statement in (*first, *equations, *places)][:SENTENCES]
     right = [*evidence.right, *(table.right_words() for table in tables if table.is_right)][:RIGHT]
@@ -112,7 +113,10 @@ def sentences(
 
 
 def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
-    """Return exact separations, else one-sided ones, else quantities that are wrong everywhere."""
+    """Return exact separations, else one-sided ones, else quantities that are wrong everywhere.
+
+    Without a separation come quantities that are wrong in part as well, wherever that is.
+    """
     exact, vague, everywhere = list[Statement](), list[Statement](), list[Statement]()
     for table in tables:
         statement = separation(table)
@@ -125,7 +129,19 @@ def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
                 count=len(table.elements),
             )
             (exact if table.is_law else everywhere).append(Statement(0.0, words, table.is_law))
-    return sorted(exact, key=_score) or sorted(vague, key=_score) or everywhere
+    partly = [_wrong_in_part(table) for table in tables if table.wrong_count]
+    return sorted(exact, key=_score) or sorted(vague, key=_score) or [*everywhere, *partly]
+
+
+def _wrong_in_part(table: ElementTable) -> Statement:
+    """Return how many elements of a quantity are wrong."""
+    words = sentence(
+        "Wrong in part: {quantity} ({wrong} wrong, {right} right).",
+        quantity=table.quantity,
+        wrong=table.wrong_count,
+        right=len(table.elements) - table.wrong_count,
+    )
+    return Statement(0.0, words, is_exact=False)
 
 
 def _score(statement: Statement) -> float:

@@ -124,6 +124,7 @@ class Findings(NamedTuple):
     tables: dict[str, ElementTable]
     statements: list[Statement]
     right: list[Sentence]
+    is_more_wrong: bool = False  # whether tables tell of other mistakes than the statements
 
 
 def separation(table: ElementTable) -> Statement | None:

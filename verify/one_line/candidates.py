@@ -79,7 +79,10 @@ def of_program(
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
     def variants() -> Iterator[Variant]:
-        for fault in faults_in(program.source, report.task, report.method):
+        # of fitted programs known faults have been tried before, in all of them
+        is_tried = is_fitted(program) and functions is not None
+        known = () if is_tried else faults_in(program.source, report.task, report.method)
+        for fault in known:
             faults[fault.name] = fault
             with suppress(SyntaxError):
                 wrong = program.with_source(fault.planted_in(program.source))

@@ -123,12 +123,9 @@ def changed_lines(
     compared, tolerance = _compared(report, greeting, doubtful)
     if not compared:
         return ()
-    has_limits = any("cones" in exchange.case.inputs for exchange in compared)
-    programs = [
-        program
-        for program in programs_of(report.task, report.method, greeting.step)
-        if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
-    ]
+    programs = list(programs_of(report.task, report.method, greeting.step))
+    if report.task == "inverse_kinematics":
+        programs = [program for program in programs if _tells(program, compared)]
     best = tuple[Explanation, ...]()
     if proposals is not None:
         is_known |= not proposals.is_wrong and report.task in RARE_ELSEWHERE
@@ -155,6 +152,14 @@ def changed_lines(
         for program in programs[: 1 if report.task in OF_STEPS else None]:
             best = best or of_numbers(program, report, compared, tolerance)
     return best if best and best[0].share >= MIN_SHARE else ()
+
+
+def _tells(program: Program, compared: Sequence[Exchange]) -> bool:
+    """Return whether poses tell a program: of limits or not; its constants show in rotations."""
+    has_limits = any("cones" in exchange.case.inputs for exchange in compared)
+    answers = [exchange.answer for exchange in compared]
+    is_shown = any(isinstance(a, Answer) and "local_rotations" in a.values for a in answers)
+    return has_limits is ("within" in program.names) and (is_shown or not is_fitted(program))
 
 
 def _compared(
