@@ -27,10 +27,9 @@ from kinematics_solvers import (
 
 from plumbob.reference import IK_SOLVERS, resample, rotation
 from plumbob.text.sentence import codes_in
-from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.greeting import Fixed, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import honest, problems, sweeps
+from plumbob.verify.kinematics import honest, sweeps
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import solve
 from plumbob.verify.kinematics.textbook import Choices
@@ -72,20 +71,6 @@ def test_one_iteration_too_many_that_is_reported_is_wrong():
     assert "claims" in broken(judged_some(INVERSE, ccd, "ccd"))
 
 
-@pytest.mark.parametrize("is_told", [True, False])
-def test_right_points_beside_unknown_rotations_are_told(is_told):
-    """The rotations have a mistake that no catalogue knows; the points are right, or are not."""
-    greeting, trials = Greeting(1, (INVERSE,)), []
-    for case in problems.cases(greeting, "fabrik", 1, False)[:3]:
-        local, positions, _ = solve("fabrik", case.inputs)
-        local = rotation.multiply(local, rotation.exponential([0.3, 0.2, 0.1]))
-        positions = positions + (0.0 if is_told else 0.01)
-        answer = Answer({"local_rotations": local, "positions": positions}, 0.0)
-        trials.append(sweeps.PoseTrial(Exchange(case, answer, answer)))
-    comparison = sweeps.SweepComparison("fabrik", wrong=[trials[0].case.name])
-    assert (sweeps.right_points(comparison, trials, greeting) is not None) == is_told
-
-
 @pytest.mark.parametrize(("made", "is_told"), [(1, True), (10, False)])
 @pytest.mark.usefixtures("without_changed_lines")
 def test_another_number_of_sweeps_than_the_declared_one_is_told(made, is_told):
@@ -109,29 +94,22 @@ def test_students_forward_kinematics_is_right():
     report = judged(FORWARD, students.forward_kinematics)
     assert report.verdict is RIGHT
     assert report.digits > 13
-    assert report.slowdown > 0.0
-    assert report.diagnosis.explanations == ()
     single = students.in_single(students.forward_kinematics)
     assert judged(FORWARD, single, precision="single").verdict is RIGHT
     assert judged(FORWARD, single).verdict is RIGHT_EXCEPT
 
 
-@pytest.mark.sample("ccd-inverse", "ccd-track", without=["anderson"])
-@pytest.mark.parametrize("task", [INVERSE, TRACK])
+@pytest.mark.sample("ccd-True-inverse", "ccd-False-inverse", "ccd-True-track", without=["anderson"])
+@pytest.mark.parametrize(
+    ("task", "is_declared"), [(INVERSE, True), (INVERSE, False), (TRACK, True)]
+)
 @pytest.mark.parametrize("solver", IK_SOLVERS)
-def test_reference_is_not_accused(task, solver):
-    report = judged(task, reference(task, solver), solver)
-    assert report.verdict <= (RIGHT if (task, solver) == (INVERSE, "ccd") else RIGHT_EXCEPT)
+def test_reference_is_not_accused(task, is_declared, solver):
+    report = judged(task, reference(task, solver), solver if is_declared else "")
+    is_exact = (task, solver, is_declared) == (INVERSE, "ccd", True)
+    assert report.verdict <= (RIGHT if is_exact else RIGHT_EXCEPT)
     assert not report.diagnosis.explanations
-
-
-@pytest.mark.sample("ccd", without=["anderson_ccd"])
-@pytest.mark.parametrize("solver", IK_SOLVERS)
-def test_undeclared_reference_is_not_accused(solver):
-    report = judged(INVERSE, reference(INVERSE, solver))
-    assert report.verdict <= RIGHT_EXCEPT
-    assert not report.diagnosis.explanations
-    if solver in METHODS:
+    if solver in METHODS and not is_declared:
         assert "sweeps are those of" in str(report.diagnosis.behaviour)
 
 
@@ -294,11 +272,8 @@ def changed_inverse(**changes):
 NOISE = np.random.default_rng(0)
 INVERSE_LIES = {
     "link lengths": {"positions": lambda a, i: 1.001 * a["positions"]},
-    "root in place": {"positions": lambda a, i: a["positions"] + 1e-6},
-    "rotations agree with positions": {"positions": lambda a, i: a["positions"] + 1e-3},
     "numbers": {"positions": lambda a, i: a["positions"] * np.nan},
     "claims": {"converged": lambda a, i: True},
-    "claims of a residual": {"residual": lambda a, i: 0.0},
     "equal answers": {"positions": lambda a, i: a["positions"] + 1e-6 * NOISE.uniform()},
 }
 
@@ -308,7 +283,7 @@ INVERSE_LIES = {
 @pytest.mark.usefixtures("verdict_alone")
 def test_law_of_inverse_kinematics_catches_a_lie(law):
     report = judged_some(INVERSE, changed_inverse(**INVERSE_LIES[law]), "ccd")
-    assert law.split(" of ")[0] in broken(report)
+    assert law in broken(report)
     assert report.verdict >= WRONG
 
 
@@ -427,21 +402,11 @@ def start_repeated(case):
     return np.concatenate([points, points[:1]]) if case.inputs["closed"] else points
 
 
-@pytest.mark.sample("keeps", "joins")
-@pytest.mark.parametrize(
-    ("make", "word"),
-    [(bridged, "joins"), (kept, "keeps"), (by_reference_spacing, ""), (start_repeated, "")],
-)
-def test_honest_rule_is_not_accused(make, word):
+@pytest.mark.sample("kept", "bridged")
+@pytest.mark.parametrize("make", [bridged, kept, by_reference_spacing, start_repeated])
+def test_honest_rule_is_not_accused(make):
     report = judged(RESAMPLE, resampler(make))
     assert report.verdict <= (RIGHT if make is bridged else RIGHT_EXCEPT)
-    assert word in str(report.diagnosis.behaviour)
-
-
-@pytest.mark.usefixtures("verdict_alone")
-def test_points_in_single_precision_are_right_if_declared():
-    function = resampler(lambda case: bridged(case).astype(np.float32))
-    assert judged(RESAMPLE, function, precision="single").verdict is RIGHT
 
 
 RESAMPLE_LIES = {
@@ -464,8 +429,3 @@ def test_law_of_resampling_catches_a_lie(law):
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_single_point_is_wrong_and_not_an_error_of_the_judge():
     assert judged(RESAMPLE, resampler(lambda case: bridged(case)[:1])).verdict is WRONG
-
-
-def test_points_off_the_curve_tell_nothing_about_strokes():
-    report = judged(RESAMPLE, resampler(lambda case: np.full((case.inputs.get("count", 9), 3), 50)))
-    assert report.diagnosis.behaviour is None

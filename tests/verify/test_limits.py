@@ -76,7 +76,7 @@ def hinge(angle, tilt=0.0, target=0.5, upper=0.5):
     ],
 )
 def test_a_hinge_keeps_its_limits_and_reaches_its_target(angle, tilt, law, verdict):
-    ((judgement,), _) = limits.judge([hinge(angle, tilt)], GREETING, True)
+    ((judgement,), _) = limits.judge([hinge(angle, tilt)], GREETING)
     broken = {found.law for found in judgement.findings if found.verdict}
     assert judgement.verdict is verdict
     assert law in broken if law else not broken
@@ -88,7 +88,7 @@ def test_a_hinge_keeps_its_limits_and_reaches_its_target(angle, tilt, law, verdi
 )
 def test_to_a_target_within_a_tenth_of_a_metre_no_joint_rotates_by_a_radian(angle, target, jumps):
     exchange = hinge(angle, target=target, upper=2.0)
-    ((judgement,), _) = limits.judge([exchange], GREETING, True)
+    ((judgement,), _) = limits.judge([exchange], GREETING)
     verdicts = {found.law: found.verdict for found in judgement.findings}
     expected = Verdict.RIGHT_EXCEPT if jumps else Verdict.RIGHT
     assert verdicts.get("no jumps", Verdict.RIGHT) is expected
@@ -97,7 +97,7 @@ def test_to_a_target_within_a_tenth_of_a_metre_no_joint_rotates_by_a_radian(angl
 def test_an_answer_without_rotations_is_broken():
     exchange = hinge(0.5)
     answer = Answer({"positions": np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])}, 0.0)
-    ((judgement,), misreading) = limits.judge([replace(exchange, answer=answer)], GREETING, True)
+    ((judgement,), misreading) = limits.judge([replace(exchange, answer=answer)], GREETING)
     assert judgement.verdict is Verdict.BROKEN
     assert not misreading
 

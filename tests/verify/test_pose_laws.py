@@ -10,7 +10,6 @@ import pytest
 
 from plumbob.reference import Skeleton, forward_kinematics, rotation
 from plumbob.text.sentence import sentence
-from plumbob.verify import laws
 from plumbob.verify.case import Case
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import Verdict
@@ -210,13 +209,6 @@ def test_only_what_uses_all_iterations_converges_slowly(case, iterations, words)
     assert f"chain of {REACH:.3g} m" in str(finding.sentence)
 
 
-@pytest.mark.parametrize("key", ["nearest point, approached", "target reached, undetermined"])
-def test_a_distance_stands_beside_the_length_of_the_chain(key):
-    words = laws.finding(key, 4.0, reach=2.6).sentence
-    assert "4 m" in str(words)
-    assert "its chain of 2.6 m could reach" in str(words)
-
-
 @pytest.mark.parametrize("precision", STALL)
 def test_stall_near_the_target_is_right_with_a_reservation(case, precision):
     greeting = Greeting(1, ("inverse_kinematics",), precision=precision)
@@ -225,12 +217,6 @@ def test_stall_near_the_target_is_right_with_a_reservation(case, precision):
         excess = factor * STALL[precision] * REACH
         finding = inverse_kinematics.reached(excess, 1e-12, case, "ccd", greeting, {})
         assert finding.verdict is verdict
-
-
-@pytest.mark.parametrize(("growth", "verdict"), [(0.5e-9, RIGHT), (2e-9, WRONG), (-0.5, RIGHT)])
-def test_a_sweep_takes_no_effector_farther_away(case, growth, verdict):
-    found = inverse_kinematics.not_farther(case.facts["before"] + growth, 1e-9, case)
-    assert found.verdict is verdict
 
 
 @pytest.mark.parametrize(

@@ -34,115 +34,45 @@ OF_SQUARES = sentence("the square of the distance to the target is below the tol
 class FollowedSolve(NamedTuple):
     """The textbook's sweeps up to the end of a solve."""
 
-    gaps: FloatArray  # from the target to the effector, before the first sweep and after each [m]
+    distances: FloatArray  # of effector and target, before the first sweep and after each [m]
     tolerance: float  # [m]
     is_early: bool  # whether the textbook goes on
-    lengths: FloatArray  # of the links [m]
-    root_distance: float  # of the target [m]
 
-
-def _distances(solve: FollowedSolve) -> FloatArray:
-    return np.asarray(np.linalg.norm(solve.gaps, axis=1))
-
-
-def _gains(solve: FollowedSolve) -> FloatArray:
-    return np.append(np.inf, -np.diff(_distances(solve)))
-
-
-def _beyond(solve: FollowedSolve, links: slice) -> FloatArray:
-    """Return after each sweep the distance from the nearest point of some links [m]."""
-    lengths, d = solve.lengths[links], solve.root_distance
-    reach, longest = float(lengths.sum()), float(lengths.max(initial=0.0))
-    shortest = max(0.0, d - reach, 2.0 * longest - reach - d)
-    return np.append(np.inf, _distances(solve)[1:] - shortest)
+    @property
+    def gains(self) -> FloatArray:
+        """By how much each sweep lowers the distance [m], infinite before the first."""
+        return np.append(np.inf, -np.diff(self.distances))
 
 
 # What programs compare with a constant or with the tolerance, the constant if the words of the test
-# do not tell it, and these words. Near the reach rounding decides.
+# do not tell it, and these words.
 Quantity = Callable[[FollowedSolve], FloatArray]
-AT_REACH = 1e-9
 TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
     (
-        lambda s: -np.arange(len(s.gaps), dtype=float),
+        lambda s: -np.arange(len(s.distances), dtype=float),
         None,
         sentence("the number of sweeps is {sweeps}, whatever max_iterations is"),
     ),
-    *(
-        (
-            lambda s, links=links: _beyond(s, links),
-            AT_REACH,
-            sentence(
-                "the effector is as near as it could come without the {link} link, which is left "
-                "out of the reach",
-                link=link,
-            ),
-        )
-        for link, links in (("first", slice(1, None)), ("last", slice(-1)))
-    ),
-    *(
-        (
-            lambda s, k=k: np.linalg.norm(np.delete(s.gaps, k, axis=1), axis=1) / s.tolerance,
-            1.0,
-            sentence("the distance to the target without {axis} is below the tolerance", axis=axis),
-        )
-        for k, axis in enumerate("xyz")
-    ),
-    *(
-        (
-            lambda s, k=k: np.abs(s.gaps[:, k]) / s.tolerance,
-            1.0,
-            sentence("{axis} of effector - target is below the tolerance", axis=axis),
-        )
-        for k, axis in enumerate("xyz")
+    (lambda s: s.distances**2 / s.tolerance, 1.0, OF_SQUARES),
+    (
+        lambda s: s.distances,
+        None,
+        sentence("the distance to the target is below about {bound:.3g} m"),
     ),
     (
-        lambda s: s.gaps.max(axis=1) / s.tolerance,
-        1.0,
-        sentence("each component of effector - target is below the tolerance, even negative"),
-    ),
-    (
-        lambda s: (-s.gaps).max(axis=1) / s.tolerance,
-        1.0,
-        sentence("each component of target - effector is below the tolerance, even negative"),
-    ),
-    (lambda s: _distances(s) ** 2 / s.tolerance, 1.0, OF_SQUARES),
-    (_distances, None, sentence("the distance to the target is below about {bound:.3g} m")),
-    (
-        lambda s: _distances(s) / s.tolerance,
+        lambda s: s.distances / s.tolerance,
         None,
         sentence("the distance to the target is below about {bound:.3g} times the tolerance"),
     ),
-    (_gains, None, sentence("a sweep lowers the distance by less than about {bound:.3g} m")),
     (
-        lambda s: _gains(s) / s.tolerance,
+        lambda s: s.gains,
+        None,
+        sentence("a sweep lowers the distance by less than about {bound:.3g} m"),
+    ),
+    (
+        lambda s: s.gains / s.tolerance,
         None,
         sentence("a sweep lowers the distance by less than about {bound:.3g} times the tolerance"),
-    ),
-    (
-        lambda s: np.append(np.inf, np.linalg.norm(np.diff(s.gaps, axis=0), axis=1)),
-        None,
-        sentence("a sweep moves the effector by less than about {bound:.3g} m"),
-    ),
-    (
-        lambda s: np.append(np.inf, _gains(s)[1:] / _distances(s)[:-1]),
-        None,
-        sentence("a sweep lowers the distance by less than about {bound:.3g} of it"),
-    ),
-    (
-        lambda s: s.lengths.sum() / np.full(len(s.gaps), s.root_distance),
-        None,
-        sentence(
-            "the links together are shorter than about {bound:.3g} times the distance of the "
-            "target from the root, wherever the effector is"
-        ),
-    ),
-    (
-        lambda s: np.full(len(s.gaps), s.root_distance) / s.lengths.sum(),
-        None,
-        sentence(
-            "the target is nearer to the root than about {bound:.3g} of the links together, "
-            "wherever the effector is"
-        ),
     ),
 )
 
@@ -162,7 +92,7 @@ def explanation(
     if not ended:
         return None
     early = [solve for solve in ended if solve.is_early]
-    is_single = len(early) > 1 and all(len(solve.gaps) == 2 for solve in early)
+    is_single = len(early) > 1 and all(len(solve.distances) == 2 for solve in early)
     if method == "fabrik" and is_single:  # after one sweep
         return Explanation((BETWEEN,), sentences_of("fabrik")[BETWEEN], 1.0, 0.0)
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
@@ -193,11 +123,9 @@ def _solve(trial: PoseTrial, method: str, greeting: Greeting) -> FollowedSolve |
     bound = max(SAME_POSE[greeting.precision] * size, others.min(initial=np.inf) / NEARER)
     if np.flatnonzero(distances <= bound).tolist() != [count]:
         return None
-    gaps = np.array([x[inputs["effector"]] - inputs["target"] for x in poses[: count + 1]])
-    path = trial.pose.path
-    lengths = np.linalg.norm(inputs["offsets"][path[1:]], axis=1)
-    root_distance = float(np.linalg.norm(inputs["target"] - poses[0][path[0]]))
-    return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed, lengths, root_distance)
+    ends = np.array([x[inputs["effector"]] for x in poses[: count + 1]])
+    gaps = np.linalg.norm(ends - inputs["target"], axis=1)
+    return FollowedSolve(gaps, float(inputs["tolerance"]), count < needed)
 
 
 def by_squares(trials: Sequence[PoseTrial]) -> tuple[Explanation, ...]:

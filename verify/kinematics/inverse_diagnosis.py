@@ -28,7 +28,7 @@ def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
     ]
     diagnosis = claims.with_claims(diagnosis, judgements, answers, judged_answers.is_placed)
     if is_sound(judgements):  # what is wrong without limits is so with them
-        _, key = limits.judge(limited, greeting, True)
+        _, key = limits.judge(limited, greeting)
         reading = [Explanation((key,), sentences_of("limits")[key], 1.0, 0.0)] if key else []
         diagnosis = replace(diagnosis, explanations=(*diagnosis.explanations, *reading))
     return with_hints(judged_answers.report.judgements, diagnosis)
@@ -65,8 +65,6 @@ def _with_hints(
     hints = (
         sweeps.idle(trials) or sweeps.idle(first_sweeps),
         sweeps.other_count(comparison, sweep_trials, greeting),
-        sweeps.right_points(comparison, sweep_trials, greeting),
-        sweeps.lengths(trials),
     )
     return replace(diagnosis, hints=tuple(filter(None, hints)))
 

@@ -70,7 +70,7 @@ def judge(exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> Tas
     limited, unlimited = split(exchanges)
     trials, comparison = judged_trials(unlimited, greeting, method)
     judgements = [trial.judgement for trial in trials]
-    limited_judgements, _ = limits.judge(limited, greeting, is_sound(judgements))
+    limited_judgements, _ = limits.judge(limited, greeting)
     behaviour = comparison.damped or comparison.behaviour
     return report(TASK, method, [*judgements, *limited_judgements], behaviour)
 

@@ -13,7 +13,6 @@ import numpy as np
 
 from plumbob.reference import Articulation, Skeleton, rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
-from plumbob.reference.articulation import clamp_ball
 
 from ..case import Case
 from ..exchange import Answer, Exchange
@@ -21,7 +20,7 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, Verdict
 from ..laws import finding, judge_case
 from . import pose_laws, problems, rounding, skeletons
-from .predictions import forward, solve
+from .predictions import forward
 from .problems import TargetProblem
 from .skeletons import CaseFamily
 
@@ -192,20 +191,14 @@ def _largest_rotation(local: FloatArray, inputs: Inputs) -> float:
     return float(rotation.angle(local, inputs["local_rotations"])[:-1].max())
 
 
-def judge(
-    exchanges: Sequence[Exchange], greeting: Greeting, is_sound: bool
-) -> tuple[list[CaseJudgement], str]:
-    """Return the judgements of answers to requests with limits, and how they are misread or "".
-
-    Only where answers without limits are sound, missed targets tell anything about limits.
-    """
+def judge(exchanges: Sequence[Exchange], greeting: Greeting) -> tuple[list[CaseJudgement], str]:
+    """Return the judgements of answers to requests with limits, and how they are misread or ""."""
     pairs = [(exchange.case, _local(exchange)) for exchange in exchanges]
     answers = [(case, local) for case, local in pairs if local is not None]
     whole = [answer for answer in answers if not _is_sweep(answer[0])]
     misses = [_miss(local, case.inputs) > _reach(case, greeting) for case, local in whole]
     is_lost = sum(misses) > MAX_MISSES * len(misses)
     key = _misreading(answers, is_lost, greeting)
-    key = "" if key == CLAMPED and not is_sound else key
     miss = "within limits"
     if key or is_lost:
         miss = "most" if is_lost else "misread"
@@ -291,23 +284,14 @@ def _shifted(shift: int, limits: JointLimits) -> JointLimits:
     return JointLimits(*(np.roll(array, shift, axis=0) for array in limits))
 
 
-def _without(names: Sequence[str], limits: JointLimits) -> JointLimits:
-    """Return limits without those of these names."""
-    widest = zip(FIELDS[1:], (np.pi, -np.pi, np.pi), strict=True)
-    return limits._replace(**{n: np.full(len(limits.axes), x) for n, x in widest if n in names})
-
-
-def _without_cones(is_hinge: bool, limits: JointLimits) -> JointLimits:
-    """Return limits without the cones of hinges, or of other joints."""
-    return limits._replace(cones=np.where((limits.cones == 0.0) == is_hinge, np.pi, limits.cones))
-
-
-def _without_twists(is_hinge: bool, limits: JointLimits) -> JointLimits:
-    """Return limits without the twists of hinges, or of joints with cones."""
-    is_left, free = (limits.cones == 0.0) == is_hinge, _without(FIELDS[2:], limits)
+def _without(
+    names: Sequence[str], limits: JointLimits, of_hinges: bool | None = None
+) -> JointLimits:
+    """Return limits without those of these names: of all joints, of hinges alone, or of others."""
+    is_free = of_hinges is None or (limits.cones == 0.0) == of_hinges
+    widest = dict(zip(FIELDS[1:], (np.pi, -np.pi, np.pi), strict=True))
     return limits._replace(
-        lower=np.where(is_left, free.lower, limits.lower),
-        upper=np.where(is_left, free.upper, limits.upper),
+        **{name: np.where(is_free, widest[name], getattr(limits, name)) for name in names}
     )
 
 
@@ -356,15 +340,15 @@ READINGS: Mapping[str, Reading] = {
     "axes in the world": _in_the_world,
     "limits of the next joint": _of_limits(partial(_shifted, -1)),
     "limits of the joint before": _of_limits(partial(_shifted, 1)),
-    "hinges leave their limits": _of_limits(partial(_without_twists, True)),
-    "twists of cones ignored": _of_limits(partial(_without_twists, False)),
-    "cones ignored": _of_limits(partial(_without_cones, False)),
-    "hinges tilt": _of_limits(partial(_without_cones, True)),
+    "hinges leave their limits": _of_limits(partial(_without, FIELDS[2:], of_hinges=True)),
+    "twists of cones ignored": _of_limits(partial(_without, FIELDS[2:], of_hinges=False)),
+    "cones ignored": _of_limits(partial(_without, FIELDS[1:2], of_hinges=False)),
+    "hinges tilt": _of_limits(partial(_without, FIELDS[1:2], of_hinges=True)),
     "lower limits ignored": _of_limits(partial(_without, ("lower",))),
     "upper limits ignored": _of_limits(partial(_without, ("upper",))),
     "twists ignored": _of_limits(partial(_without, FIELDS[2:])),
 }
-IGNORED, CLAMPED = "limits ignored", "clamped after the solve"
+IGNORED = "limits ignored"
 
 
 def _ends(reading: Reading, case: Case, local: FloatArray, bound: float) -> int:
@@ -383,7 +367,6 @@ def _misreading(
     """Return the key of how limits are misread, "" if they are not or nobody knows."""
     bound, scores = rounding.DEAD_ANGLE[greeting.precision], dict[str, int]()
     whole = [answer for answer in answers if not _is_sweep(answer[0])]
-    sweeps = [answer for answer in answers if _is_sweep(answer[0])]
     for key, reading in READINGS.items():
         ends = [_ends(reading, case, local, bound) for case, local in whole]
         if ends and min(ends) >= 0:
@@ -392,29 +375,4 @@ def _misreading(
     if key == IGNORED:
         is_far = any(margins(x, limits_of(case.inputs)).min() < -BEYOND for case, x in answers)
         return IGNORED if is_far and not is_lost else ""
-    if "" not in scores or scores[key] >= scores[""] + MORE_ENDS:
-        return key
-    is_clamped = bool(sweeps) and all(_is_clamped(*answer, bound) for answer in sweeps)
-    return CLAMPED if is_lost and is_clamped and _is_unfinished(whole, greeting) else ""
-
-
-def _is_clamped(case: Case, local: FloatArray, bound: float) -> bool:
-    """Return whether a pose is that after a sweep without limits, brought within them."""
-    axes, cones, lower, upper = limits_of(case.inputs)
-    free, _, _ = solve(case.inputs["method"].lower(), case.inputs)
-    clamped = [
-        clamp_ball(Q, *limits) for Q, *limits in zip(free, axes, lower, upper, cones, strict=True)
-    ]
-    joints = case.facts["path"][:-1]
-    return bool(rotation.angle(np.array(clamped)[joints], local[joints]).max() <= bound)
-
-
-def _is_unfinished(answers: Sequence[tuple[Case, FloatArray]], greeting: Greeting) -> bool:
-    """Return whether most answers that miss are not where CCD within limits comes to rest."""
-    gains = [
-        _miss(solve_within("ccd", {**case.inputs, "local_rotations": local}), case.inputs)
-        <= _reach(case, greeting)
-        for case, local in answers
-        if _miss(local, case.inputs) > _reach(case, greeting)
-    ]
-    return sum(gains) > MAX_MISSES * len(gains)
+    return key if "" not in scores or scores[key] >= scores[""] + MORE_ENDS else ""

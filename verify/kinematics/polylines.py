@@ -16,10 +16,9 @@ class Polyline:
         self.length = float(self.arc[-1])
         self.bridges = np.isin(np.arange(1, len(self.points)), strokes)
 
-    def distance(self, point: FloatArray, bridged: bool) -> float:
-        """Return the distance of a point, from the bridges too if `bridged` [m]."""
-        distance, _ = _to_chords(self.points[:-1], self.points[1:], point)
-        return float(np.where(self.bridges & (not bridged), np.inf, distance).min())
+    def distance(self, point: FloatArray) -> float:
+        """Return the distance of a point from the line and its bridges [m]."""
+        return float(_to_chords(self.points[:-1], self.points[1:], point)[0].min())
 
     def is_on_chord(self, point: FloatArray, bound: float) -> bool:
         """Return whether a point lies between any two points of the line, a corner cut off."""

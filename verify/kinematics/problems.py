@@ -5,7 +5,7 @@ honest solver does. No rotation of a single sweep is close to 0 or pi, where hon
 it differ.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -20,7 +20,7 @@ from ..greeting import Greeting
 from . import skeletons
 from .predictions import forward, path_to, solve
 from .skeletons import CaseFamily, PosedSkeleton
-from .textbook import SOLVERS, Choices
+from .textbook import SOLVERS
 
 TASK = "inverse_kinematics"
 # The rotations of single sweeps are at least so far from 0 and pi [rad].
@@ -30,8 +30,6 @@ MAX_AMPLIFICATION = 30.0
 # A target counts as easy if both textbook solvers reach it in EASY sweeps; ALLOWED are allowed.
 EASY, ALLOWED = 12, 60
 DRAWS = 2000
-# The most iterations of a solve by an own method whose poses are asked one by one.
-CONTINUED = 7
 # The numbers of sweeps that follow a single one, after a wrong verdict.
 COUNTED = (2, 5, 60)
 LOOSE = 1e-2
@@ -128,8 +126,8 @@ def _is_suitable(family: CaseFamily, problem: TargetProblem) -> bool:
             return least < low and high < most and is_telling(family.sweeps, problem)
         case "easy" | "circle" | "behind":
             return is_easy(family.tolerance, problem)
-        case "stop test":
-            return shows_stop(family.target[1], problem)
+        case "square" | "stall":
+            return all(_shows_stop(family.target[0], method, problem) for method in SOLVERS)
     return True
 
 
@@ -180,18 +178,37 @@ def is_easy(tolerance: float, problem: TargetProblem) -> bool:
     return all(solve(method, inputs)[2] <= EASY for method in SOLVERS)
 
 
-def shows_stop(test: int, problem: TargetProblem) -> bool:
-    """Return whether both solvers reach the target, but end elsewhere with a faulty test."""
+def _shows_stop(test: str, method: str, problem: TargetProblem) -> bool:
+    """Return whether a solver reaches the target soon, but ends elsewhere with a faulty test.
+
+    The square of the tolerance takes its place, or the change of the distance that of the distance.
+    """
     inputs = request(problem, LOOSE, ALLOWED, "")
-    for method in SOLVERS:
-        _, x, sweeps = solve(method, inputs)
-        _, y, faulty_sweeps = solve(method, inputs, Choices(test=test))
-        miss = np.linalg.norm(y[problem.effector] - problem.target)
-        if sweeps > ALLOWED // 2 or faulty_sweeps == sweeps or (test == 3 and miss <= 1.5 * LOOSE):
+    _, x, sweeps = solve(method, inputs)
+    if sweeps > ALLOWED // 2:
+        return False
+    if test == "square":
+        _, y, faulty_sweeps = solve(method, inputs | {"tolerance": LOOSE * LOOSE})
+    else:
+        y, faulty_sweeps = _stalled(method, inputs)
+        if np.linalg.norm(y[problem.effector] - problem.target) <= 1.5 * LOOSE:
             return False
-        if np.abs(x - y).max() < 1e-3:
-            return False
-    return True
+    return faulty_sweeps != sweeps and bool(np.abs(x - y).max() >= 1e-3)
+
+
+def _stalled(method: str, inputs: Mapping[str, Any]) -> tuple[FloatArray, int]:
+    """Return the positions of the first sweep that changes the distance by little, and its number.
+
+    It is the last one allowed if none does.
+    """
+    before, x = np.inf, forward(inputs)[0]
+    for count in range(1, ALLOWED + 1):
+        distance = np.linalg.norm(x[inputs["effector"]] - inputs["target"])
+        if abs(before - distance) <= LOOSE:
+            return x, count - 1
+        before = distance
+        _, x, _ = solve(method, {**inputs, "tolerance": 0.0, "max_iterations": count})
+    return x, ALLOWED
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -204,9 +221,7 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
         if skeletons.suits(problem.skeleton.parents, greeting, problem.effector)
         and not (greeting.fixed.max_iterations and _is_about_sweeps(family))
     ]
-    is_known = method.lower() in ("", *SOLVERS) or greeting.fixed.max_iterations is not None
-    own = () if is_known else problems[2:6:2]
-    return [*problems, *_transformed(problems, greeting), *_continued(own)]
+    return [*problems, *_transformed(problems, greeting)]
 
 
 def telling_cases(greeting: Greeting, method: str, seed: int) -> list[Case]:
@@ -240,17 +255,6 @@ def _beyond(problem: TargetProblem, tolerance: float) -> TargetProblem:
     distance = geometry["reach"] + max(2.0 * tolerance, BEYOND)
     direction = (problem.target - root) / np.linalg.norm(problem.target - root)
     return problem._replace(target=root + distance * direction)
-
-
-def _continued(cases: Sequence[Case]) -> Iterator[Case]:
-    """Yield cases of a single sweep again with more, to know the poses before and after each."""
-    for case in cases:
-        for count in range(2, CONTINUED + 1):
-            inputs = {**case.inputs, "max_iterations": count}
-            about = sentence("The case '{case}' with {count} sweeps.", case=case.name, count=count)
-            facts = {**case.facts, "sweeps": count, "continues": case.name}
-            name = f"{case.name}, {count} sweeps"
-            yield Case(name, TASK, inputs, "more sweeps", about, facts=facts)
 
 
 def _case(

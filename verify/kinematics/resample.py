@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray, distinct_texts
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
-from ..exchange import Answer, Exchange
+from ..exchange import Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case
@@ -96,7 +96,7 @@ def judge(
         )
         for exchange in exchanges
     ]  # fmt: skip
-    return report(TASK, method, judgements, _behaviour_at_strokes(exchanges, greeting))
+    return report(TASK, method, judgements)
 
 
 def _even_points(case: Case) -> FloatArray:
@@ -107,30 +107,10 @@ def _even_points(case: Case) -> FloatArray:
     return line.even_points(count, closed)
 
 
-def _behaviour_at_strokes(exchanges: Sequence[Exchange], greeting: Greeting) -> Sentence | None:
-    """Return whether strokes are bridged or kept apart, if an answer shows it."""
-    for exchange in exchanges:
-        if len(exchange.case.inputs["strokes"]) > 1 and isinstance(exchange.answer, Answer):
-            points, line = exchange.answer.values.get("points"), exchange.case.facts["line"]
-            if points is None or not len(points) or not np.isfinite(points).all():
-                continue
-            bound = _bound(exchange.case, greeting)
-            if _distances(points, line, True).max() > bound:
-                continue  # nothing is known from points off the line
-            if _distances(points, line, False).max() > bound:
-                return sentence("It joins strokes, as is allowed: points lie between them as well.")
-            return sentence("It keeps strokes apart, as is allowed: no points lie between them.")
-    return None
-
-
 def _bound(case: Case, greeting: Greeting) -> float:
     """Return what rounding allows: arc lengths add up over all points [m]."""
     size = len(case.inputs["curve"]) * case.facts["size"] + case.facts["line"].length
     return float(rounding.ROUNDINGS_A_JOINT * greeting.epsilon * size)
-
-
-def _distances(points: FloatArray, line: Polyline, bridged: bool) -> FloatArray:
-    return np.array([line.distance(point, bridged) for point in points])
 
 
 def _findings(case: Case, greeting: Greeting, outputs: Mapping[str, Any]) -> list[Finding]:
@@ -157,8 +137,13 @@ def point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Findi
 
 def _point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Finding]:
     line, bound, inputs = case.facts["line"], _bound(case, greeting), case.inputs
-    distances = _distances(points, line, True)
-    findings = [_on_line(points, distances, line, bound), _ends(points, case, bound)]
+    distances = np.array([line.distance(point) for point in points])
+    is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
+    key, index = "on the line, corners cut" if is_cut else "on the line", int(np.argmax(distances))
+    findings = [
+        finding(key, distances[index], bound, index=index),
+        _ends(points, case, bound),
+    ]
     if "count" in inputs:
         excess = len(points) - inputs["count"]
         is_start_repeated = inputs["closed"] and excess == 1
@@ -174,13 +159,6 @@ def _point_laws(points: FloatArray, case: Case, greeting: Greeting) -> list[Find
         if inputs["closed"] and len(points) > 1:
             findings.append(_closing(points, arc, line, bound))
     return findings
-
-
-def _on_line(points: FloatArray, distances: FloatArray, line: Polyline, bound: float) -> Finding:
-    """Return whether points are on the line, or between two of its points."""
-    is_cut = all(line.is_on_chord(points[i], bound) for i in np.flatnonzero(distances > bound))
-    key = "on the line, corners cut" if is_cut else "on the line"
-    return finding(key, distances.max(), bound, index=int(np.argmax(distances)))
 
 
 def _ends(points: FloatArray, case: Case, bound: float) -> Finding:

@@ -30,8 +30,6 @@ MIN_SHARE = 0.5
 # A rotation smaller than this share of CCD's, or angle [rad], may be rounding and not damping.
 SMALLEST = 1e-3
 LAW = "one sweep"
-# Products of unit quaternions, not normalised, stay nearer to the length 1.
-DRIFTED = 1e-2
 # The most sweeps that answers may have in the place of those that are asked for.
 MOST_SWEEPS = 30
 # Quaternions whose numbers differ by less are alike, in single precision too.
@@ -146,19 +144,6 @@ def idle(trials: Sequence[PoseTrial]) -> Sentence | None:
             "joints, as copies."
         )
     return None
-
-
-def lengths(trials: Sequence[PoseTrial]) -> Sentence | None:
-    """Return that answered rotations have another length than 1, None if not so."""
-    drift = max((trial.pose.drift for trial in trials if trial.pose.finite), default=0.0)
-    if drift < DRIFTED:
-        return None
-    return sentence(
-        "Its local rotations are no unit quaternions: their lengths differ from 1 by up to "
-        "{drift:.2g}. Normalise an axis before (cos(angle / 2), sin(angle / 2) axis) is made of "
-        "it, and each product of quaternions.",
-        drift=drift,
-    )
 
 
 def recognise_method(trials: Sequence[PoseTrial], greeting: Greeting) -> str:
@@ -307,21 +292,3 @@ def _is_after(count: int, trial: PoseTrial, method: str, greeting: Greeting) -> 
     _, x, _ = solve(method, {**inputs, "tolerance": 0.0, "max_iterations": count})
     bound = rounding.sweep(greeting.epsilon, len(x), facts["size"], facts["amplification"])
     return trial.pose.distance_to(x) <= bound
-
-
-def right_points(
-    comparison: SweepComparison, trials: Sequence[PoseTrial], greeting: Greeting
-) -> Sentence | None:
-    """Return that wrong sweeps of FABRIK have the right points, None if not so or not known."""
-    if comparison.method != "fabrik" or not comparison.wrong:
-        return None
-    for trial in trials:
-        if trial.pose.answered_positions is None:
-            return None
-        _, x, _ = solve("fabrik", trial.case.inputs)
-        gap = np.abs(trial.pose.answered_positions - x)[trial.pose.path].max()
-        if not gap <= _error(trial, "fabrik", greeting)[1]:
-            return None
-    return sentence(
-        "Its points are those of FABRIK: the mistake is in the rotations that it makes of them."
-    )

@@ -41,7 +41,6 @@ class Choices(NamedTuple):
     cap: float = UNCAPPED  # the largest of these angles [rad]
     sweep_of_a_joint: bool = False  # CCD counts each rotation as a sweep
     more_sweeps: int = 0  # beyond the number allowed
-    test: int = 0  # a number of `is_reached`
 
 
 class TextbookChain(NamedTuple):
@@ -85,28 +84,16 @@ def solve(
 ) -> int:
     """Solve in place, `pose` from the start to the result, and return the number of sweeps."""
     place(chain, pose)
-    before, i = math.inf, 0
+    i = 0
     while i < ending.sweeps + choices.more_sweeps:
-        distance = norm(subtract(load_vector(pose.positions, chain.path[-1]), target))
-        if is_reached(distance, before, ending.tolerance, choices.test):
+        effector = load_vector(pose.positions, chain.path[-1])
+        if norm(subtract(effector, target)) <= ending.tolerance:
             break
-        before = distance
         method.sweep(chain, target, i, choices, pose)
         i += 1
     if i > 0:
         method.finish(chain, pose)
     return i
-
-
-def is_reached(distance: float, before: float, tolerance: float, test: int) -> bool:
-    """Return whether a solve ends before its next sweep.
-
-    By the number of `test` the distance is compared with the tolerance, its square (2), or the
-    change of the distance is compared (3).
-    """
-    if test == 3:
-        return abs(before - distance) <= tolerance
-    return distance <= (tolerance * tolerance if test == 2 else tolerance)
 
 
 def sweep_ccd(
