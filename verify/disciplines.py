@@ -14,7 +14,6 @@ from .kinematics import (
     inverse_diagnosis,
     inverse_kinematics,
     resample,
-    robot_diagnosis,
     robot_inverse_kinematics,
     robot_jacobian,
     robot_track,
@@ -53,10 +52,10 @@ _PAIRS: Sequence[tuple[Any, Any]] = (
     (energy, None),
     (Stepping("mass_spring_step"), step_diagnosis),
     (Stepping("mass_spring_motion"), step_diagnosis),
-    (robot_jacobian, robot_diagnosis),
-    (robot_velocity, robot_diagnosis),
-    (robot_inverse_kinematics, robot_diagnosis),
-    (robot_track, robot_diagnosis),
+    (robot_jacobian, None),
+    (robot_velocity, None),
+    (robot_inverse_kinematics, None),
+    (robot_track, None),
 )
 DISCIPLINES: dict[str, Discipline] = {
     laws.TASK: Discipline(laws.cases, laws.judge, causes.diagnose if causes else _by_laws)

@@ -7,8 +7,7 @@ from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics.robot_jacobian import CONVENTIONS, TASK, cases, right_jacobian
-from plumbob.verify.kinematics.robot_models import tool_pose
-from plumbob.verify.kinematics.trajectories import twists_between
+from plumbob.verify.kinematics.robot_models import tool_pose, twists_between
 from plumbob.verify.verify import verify
 
 GREETING = Greeting(PROTOCOL, (TASK,))

@@ -7,41 +7,42 @@ import numpy as np
 import pytest
 
 from plumbob.reference.skeleton import Pose
+from plumbob.verify.disciplines import DISCIPLINES
 from plumbob.verify.exchange import Answer
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import CaseJudgement
-from plumbob.verify.kinematics import (
-    robot_jacobian,
-    robot_models,
-    robot_motions,
-    robot_targets,
-    robot_velocity,
-)
+from plumbob.verify.kinematics import robot_jacobian, robot_models, robot_targets, robot_velocity
+from plumbob.verify.kinematics.robot_inverse_kinematics import trajectory_of
+from plumbob.verify.laws import finding
+from plumbob.verify.observe.observations import of_tables
 from plumbob.verify.observe.robots import robot_evidence
 
-POSE, TRACK = robot_targets.TASK, robot_motions.TASK
-GREETING = Greeting(PROTOCOL, (POSE,))
+POSE, TRACK = robot_targets.TASK, "robot_track"
+JACOBIAN, VELOCITY = robot_jacobian.TASK, robot_velocity.TASK
 
 
 @cache
 def cases(task):
-    module = {POSE: robot_targets, TRACK: robot_motions, robot_jacobian.TASK: robot_jacobian,
-              robot_velocity.TASK: robot_velocity}[task]  # fmt: skip
-    return module.cases(GREETING, "", 0, False)
+    return DISCIPLINES[task].cases(Greeting(PROTOCOL, (task,)), "", 0, False)
 
 
-def observed(task, outputs_of, chosen):
-    judgements = [CaseJudgement(case, Answer(outputs_of(case), 0.0), (), {}) for case in chosen]
-    return " ".join(str(s.sentence) for s in robot_evidence(task, judgements).statements)
+def observed(task, outputs_of, chosen=None, findings_of=lambda case: ()):
+    """Return what is said of answers, and the places of tables."""
+    judgements = [
+        CaseJudgement(case, Answer(outputs_of(case), 0.0), findings_of(case), {})
+        for case in chosen or cases(task)
+    ]
+    evidence = robot_evidence(task, judgements)
+    places = [place for place in of_tables(list(evidence.tables.values())) if place.is_exact]
+    return " ".join(str(s.sentence) for s in (*evidence.statements, *places))
 
 
-def poses():
-    """Return near targets and single iterations of robots of at least six joints."""
-    return [
-        case for case in cases(POSE)
-        if case.family in (robot_targets.CLOSE, robot_targets.STEP)
-        and len(case.inputs["axes"]) >= 6
-    ]  # fmt: skip
+def poses(*families):
+    """Return cases of robots of at least six joints."""
+    return [c for c in cases(POSE) if c.family in families and len(c.inputs["axes"]) >= 6]
+
+
+NEAR, STEPS = poses(robot_targets.CLOSE), poses(robot_targets.STEP)
 
 
 @cache
@@ -51,47 +52,45 @@ def right_pose(name):
     return robot_models.solved(case.inputs, case.inputs["start"], tool)[0]
 
 
-def solved(case):
-    """Return right coordinates, of a single iteration those of one step."""
-    inputs = case.inputs
-    if inputs["max_iterations"] > 1:
+def solved(case, position=1.0, angle=1.0):
+    """Return right coordinates, of a single iteration those of one step for factors of errors."""
+    if case.inputs["max_iterations"] > 1:
         return right_pose(case.name)
-    return inputs["start"] + stepped(case, 1.0, 1.0)
+    motion = trajectory_of(case, {"q": case.inputs["start"]})
+    error = motion.twists(motion.previous)[0] * np.repeat([position, angle], 3)
+    return case.inputs["start"] + np.linalg.pinv(motion.jacobians[0]) @ error
 
 
-def stepped(case, position, rotation):
-    motion = robot_motion(case)
-    error = motion.twists(motion.previous)[0] * np.repeat([position, rotation], 3)
-    return np.linalg.pinv(motion.jacobians[0]) @ error
+def stiff(case, joint):
+    return np.where(
+        np.arange(len(case.inputs["axes"])) == joint, case.inputs["start"], solved(case)
+    )
 
 
-def robot_motion(case):
-    from plumbob.verify.kinematics.robot_inverse_kinematics import trajectory_of
-
-    return trajectory_of(case, {"q": case.inputs["start"]})
+def beyond(case, side, joints=slice(None)):
+    q = 0.5 * (case.inputs["lower"] + case.inputs["upper"])
+    q[joints] = case.inputs[side][joints] + (0.1 if side == "upper" else -0.1)
+    return q
 
 
 def test_nothing_is_said_of_right_poses():
-    claimed = [case for case in poses() if case.family == robot_targets.CLOSE]
-    assert observed(POSE, lambda case: {"q": solved(case)}, poses()) == ""
-    assert observed(POSE, lambda case: {"q": solved(case), "converged": True}, claimed) == ""
+    assert observed(POSE, lambda case: {"q": solved(case)}, NEAR + STEPS) == ""
 
 
-@pytest.mark.parametrize(
-    ("answer", "words"),
-    [
-        (
-            lambda case: np.where(case.inputs["slides"], 1.0, 180.0 / np.pi) * solved(case),
-            "degrees",
-        ),
-        (lambda case: solved(case) - case.inputs["start"], "changes from the start"),
-        (lambda case: solved(case)[::-1], "reverse order"),
-        (lambda case: np.where(case.inputs["slides"], 1.0, -1.0) * solved(case), "opposite sense"),
-    ],
-)
-def test_another_reading_of_coordinates_that_reaches_the_targets_is_said(answer, words):
-    text = observed(POSE, lambda case: {"q": answer(case)}, poses())
-    assert words in text
+WRONG_POSES = [
+    (lambda case: np.where(case.inputs["slides"], 1, 180 / np.pi) * solved(case), "as degrees"),
+    (lambda case: solved(case) - case.inputs["start"], "changes from the start"),
+    (lambda case: solved(case)[::-1], "reverse order"),
+    (lambda case: np.where(case.inputs["slides"], 1.0, -1.0) * solved(case), "opposite sense"),
+    (lambda case: stiff(case, 0), "Wrong at the root and nowhere else: joints that have to move"),
+    (lambda case: beyond(case, "upper"), "Wrong at upper limits and nowhere else"),
+    (lambda case: beyond(case, "lower"), "Wrong everywhere but at upper limits: limits of joints"),
+]
+
+
+@pytest.mark.parametrize(("answer", "words"), WRONG_POSES)
+def test_another_meaning_of_coordinates_and_the_place_of_wrong_ones_are_said(answer, words):
+    assert words in observed(POSE, lambda case: {"q": answer(case)}, NEAR)
 
 
 @pytest.mark.parametrize(
@@ -100,66 +99,32 @@ def test_another_reading_of_coordinates_that_reaches_the_targets_is_said(answer,
      ((-1.0, 1.0), "linear part")],
 )  # fmt: skip
 def test_the_factor_of_errors_in_a_single_iteration_is_measured(factors, words):
-    steps = [case for case in poses() if case.family == robot_targets.STEP]
-    text = observed(POSE, lambda case: {"q": case.inputs["start"] + stepped(case, *factors)}, steps)
-    assert words in text
+    assert words in observed(POSE, lambda case: {"q": solved(case, *factors)}, STEPS)
 
 
 def test_a_part_of_the_target_that_is_missed_is_counted():
-    near = [case for case in poses() if case.family == robot_targets.CLOSE]
-
-    def off(case):
-        tool = robot_models.tool_pose(case.inputs, solved(case))
-        tilted = Pose(tool.positions, case.inputs["tool_rotation"])
-        return robot_models.solved(case.inputs, solved(case), tilted)[0]
-
-    def is_at(case):
-        tool = robot_models.tool_pose(case.inputs, off(case))
-        return np.linalg.norm(tool.positions - case.inputs["target_position"]) < 1e-6
-
-    reached = list(filter(is_at, near))
-    text = observed(POSE, lambda case: {"q": off(case)}, reached)
-    assert len(reached) < 6 or f"the position of {len(reached)}" in text
-
-
-def test_a_joint_that_never_moves_is_named_by_its_place():
-    def stiff(case):
-        q = np.array(solved(case))
-        q[0] = case.inputs["start"][0]
-        return q
-
-    text = observed(POSE, lambda case: {"q": stiff(case)}, poses())
-    assert "The first joint never moves" in text
-
-
-@pytest.mark.parametrize(("side", "left"), [("upper", "upper"), ("lower", "lower")])
-def test_the_side_of_the_limits_that_are_left_is_said(side, left):
-    sign = 1.0 if side == "upper" else -1.0
-    text = observed(POSE, lambda case: {"q": case.inputs[side] + 0.1 * sign}, poses())
-    assert f"leave {left} limits" in text
-
-
-def test_claims_that_do_not_depend_on_answers_are_counted():
-    near = [case for case in poses() if case.family == robot_targets.CLOSE]
-    near = [replace(case, name=f"{case.name} {i}") for case in near for i in range(6)]
-    text = observed(POSE, lambda case: {"q": case.inputs["start"], "converged": True}, near)
-    assert "Success is reported in all" in text
+    tilted = [
+        replace(case, name=f"{case.name} {i}", inputs={
+            **case.inputs, "target_rotation": case.inputs["target_rotation"][[1, 0, 3, 2]]})
+        for case in NEAR for i in range(6)
+    ]  # fmt: skip
+    text = observed(POSE, lambda case: {"q": right_pose(case.name[:-2])}, tilted)
+    assert f"the position of {len(tilted)} and to the rotation of 0" in text
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [(lambda v, h: v * h, "are (q[i] - q[i-1]) in"), (lambda v, h: -v, "-(q[i] - q[i-1])/h"),
-     (lambda v, h: 0.0 * v, "are 0 in"), (lambda v, h: np.vstack([v[:1], v[:-1]]), "q[i-2]")],
+     (lambda v, h: 0.0 * v, "are 0 in"), (lambda v, h: np.vstack([v[:1], v[:-1]]), "q[i-2]"),
+     (lambda v, h: v, "")],
 )  # fmt: skip
 def test_the_formula_of_reported_velocities_is_found(wrong, words):
-    case = next(case for case in cases(TRACK) if case.family == robot_motions.CURVE)
-    rng = np.random.default_rng(3)
-    q = case.inputs["start"] + 0.01 * np.cumsum(rng.standard_normal((24, 7)), axis=0)
-    h = case.inputs["h"]
-    v = np.diff(q, axis=0, prepend=case.inputs["start"][None]) / h
-    assert "velocities" not in observed(TRACK, lambda case: {"q": q, "velocities": v}, [case])
-    text = observed(TRACK, lambda case: {"q": q, "velocities": wrong(v, h)}, [case])
+    case = next(case for case in cases(TRACK) if case.family == "curve")
+    steps, h = 0.01 * np.random.default_rng(3).standard_normal((24, 7)), case.inputs["h"]
+    q = case.inputs["start"] + np.cumsum(steps, axis=0)
+    text = observed(TRACK, lambda case: {"q": q, "velocities": wrong(steps / h, h)}, [case])
     assert words in text
+    assert ("velocities" in text) is bool(words)
 
 
 @pytest.mark.parametrize(("linear", "angular"), [(0.4, 1.0), (1.0, -1.0), (0.0, 1.0)])
@@ -168,23 +133,31 @@ def test_the_factor_of_each_part_of_the_tool_s_velocity_is_measured(linear, angu
         J, twist = robot_velocity.right_equation(case.inputs)
         return np.linalg.pinv(J, 1e-6) @ (twist * np.repeat([linear, angular], 3))
 
-    task = robot_velocity.TASK
-    text = observed(task, lambda case: {"velocities": speeds(case)}, cases(task))
+    text = observed(VELOCITY, lambda case: {"velocities": speeds(case)})
     part, factor = ("linear", linear) if linear != 1.0 else ("angular", angular)
     assert f"The {part} part of the tool's velocity is {factor:.3g} times" in text
     assert text.count("times") == 1
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [(lambda J, case: J * np.repeat([0.5, 1.0], 3)[:, None], "0.5 in the linear parts"),
-     (lambda J, case: J * (np.arange(J.shape[1]) != case.inputs["effector"]), "the last columns")],
-)  # fmt: skip
+WRONG_JACOBIANS = [
+    (lambda J, case: J * np.repeat([0.5, 1.0], 3)[:, None], "0.5 in the linear parts"),
+    (lambda J, case: J * (np.arange(J.shape[1]) != case.inputs["effector"]),
+     "Wrong at the effector and nowhere else: parts of columns"),
+    (lambda J, case: J[[0, 1, 2, 4, 3, 5]], "Wrong in angular parts and nowhere else"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "words"), WRONG_JACOBIANS)
 def test_the_wrong_part_of_jacobians_is_named(change, words):
-    task, world = robot_jacobian.TASK, robot_jacobian.CONVENTIONS["world, linear part first"]
+    world = robot_jacobian.CONVENTIONS["world, linear part first"]
+    right = {c.name: robot_jacobian.right_jacobian(c.inputs, world) for c in cases(JACOBIAN)}
+    assert words in observed(JACOBIAN, lambda case: {"jacobian": change(right[case.name], case)})
 
-    def answer(case):
-        J = robot_jacobian.right_jacobian(case.inputs, world)
-        return {"jacobian": change(J, case)}
 
-    assert words in observed(task, answer, cases(task))
+def test_what_all_robots_with_wrong_answers_have_is_said():
+    def findings_of(case):
+        is_rotated = (case.inputs["tool_rotation"] != robot_models.IDENTITY).any()
+        return (finding("Jacobian", float(is_rotated), 0.5, index=0),)
+
+    text = observed(JACOBIAN, lambda case: {"jacobian": case.inputs["axes"].T}, None, findings_of)
+    assert "Wrong for robots with a rotated tool (tool_rotation) and nowhere else: answers" in text

@@ -7,26 +7,19 @@ from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import robot_jacobian
-from plumbob.verify.kinematics.robot_models import tool_pose
+from plumbob.verify.kinematics.robot_models import tool_pose, twists_between
 from plumbob.verify.kinematics.robot_velocity import (
     SINGULAR,
     TASK,
     cases,
     judge,
+    right_equation,
     solving,
 )
-from plumbob.verify.kinematics.trajectories import twists_between
 from plumbob.verify.verify import verify
 
 GREETING = Greeting(PROTOCOL, (TASK,))
 CASES = cases(GREETING, "", 0, False)
-WORLD = robot_jacobian.CONVENTIONS["world, linear part first"]
-
-
-def equation(inputs):
-    twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
-    return robot_jacobian.right_jacobian(inputs, WORLD), twist
 
 
 def shortest(J, twist):
@@ -38,24 +31,23 @@ def damped(J, twist, damping):
 
 
 def report_of(solve):
-    functions = {TASK: lambda **inputs: {"velocities": solve(*equation(inputs))}}
+    functions = {TASK: lambda **inputs: {"velocities": solve(*right_equation(inputs))}}
     return verify(FunctionConnection(functions, GREETING)).tasks[0]
 
 
-def test_speeds_of_least_length_are_right_and_said_to_be():
-    report = report_of(shortest)
-    assert report.verdict is Verdict.RIGHT
-    assert "least length" in str(report.diagnosis.behaviour)
+def with_null_space(J, twist):
+    speeds = shortest(J, twist)
+    return speeds + np.ones_like(speeds) - np.linalg.pinv(J, 1e-6) @ J @ np.ones_like(speeds)
 
 
-def test_motion_in_the_null_space_is_right():
-    def solve(J, twist):
-        speeds = shortest(J, twist)
-        return speeds + np.ones_like(speeds) - np.linalg.pinv(J, 1e-6) @ J @ np.ones_like(speeds)
-
+@pytest.mark.parametrize(
+    ("solve", "words"),
+    [(shortest, "least length"), (with_null_space, "does not move the tool")],
+)
+def test_every_solution_is_right_and_the_report_says_which_it_is(solve, words):
     report = report_of(solve)
     assert report.verdict is Verdict.RIGHT
-    assert "does not move the tool" in str(report.diagnosis.behaviour)
+    assert words in str(report.diagnosis.behaviour)
 
 
 @pytest.mark.parametrize("damping", [1e-3, 0.02])
@@ -77,7 +69,7 @@ def test_damping_is_told_and_no_fault(damping):
 def test_damping_may_take_a_quarter_of_the_velocity_away_and_add_nothing(loss, verdict):
     """Of one joint a factor s² / (s² + d²) is a damping d."""
     case = next(case for case in CASES if len(case.inputs["q"]) == 1)
-    answer = Answer({"velocities": (1.0 - loss) * shortest(*equation(case.inputs))}, 0.0)
+    answer = Answer({"velocities": (1.0 - loss) * shortest(*right_equation(case.inputs))}, 0.0)
     (judgement,) = judge([Exchange(case, answer, answer)], GREETING, "").judgements
     verdicts = {found.law: found.verdict for found in judgement.findings}
     assert verdicts["velocity of the tool"] is verdict
@@ -98,7 +90,7 @@ def test_an_inverse_that_fails_in_singular_poses_alone_is_right_except():
 @pytest.mark.parametrize("case", CASES[::4], ids=lambda case: case.name)
 def test_the_tool_moves_as_asked_by_the_speeds(case):
     """Forward differences of 1e-6 are wrong by 1e-6 times the speeds' square."""
-    J, twist = equation(case.inputs)
+    J, twist = right_equation(case.inputs)
     q, h = case.inputs["q"], 1e-6
     after = tool_pose(case.inputs, q + h * shortest(J, twist))
     np.testing.assert_allclose(
@@ -107,7 +99,7 @@ def test_the_tool_moves_as_asked_by_the_speeds(case):
 
 
 def test_the_nearest_solution_is_the_answer_itself_if_that_solves():
-    J, twist = equation(CASES[-1].inputs)
+    J, twist = right_equation(CASES[-1].inputs)
     for damping in (0.0, 0.1):
         answer = damped(J, twist, damping) if damping else shortest(J, twist)
         nearest, found = solving((J, twist), answer)

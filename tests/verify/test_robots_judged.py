@@ -135,21 +135,6 @@ def test_limits_that_are_kept_only_after_the_solve_break_a_law():
     assert "limits in the solve" in broken(judge(exchanges, GREETING, ""))
 
 
-@pytest.mark.slow
-def test_an_answer_that_does_not_depend_on_the_start_is_reported():
-    answers = {}
-    for case in [
-        c for c in all_cases() if c.family in (robot_targets.AT, CLOSE, robot_targets.ANYWHERE)
-    ]:
-        answers.setdefault(case.inputs["target_position"].tobytes(), case.inputs["start"])
-    exchanges = [
-        exchange_of(case, answers[case.inputs["target_position"].tobytes()])
-        for case in all_cases()
-        if case.inputs["target_position"].tobytes() in answers and case.inputs["max_iterations"] > 1
-    ]
-    assert "start" in str(explained(TASK, exchanges, GREETING).diagnosis.behaviour)
-
-
 def test_failure_at_the_target_alone_says_what_divides_by_zero():
     near = near_cases()
     exchanges = []

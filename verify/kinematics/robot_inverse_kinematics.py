@@ -1,6 +1,6 @@
 """Robots with limits: whether tools reach their targets, limits are kept and claims are true."""
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,7 +10,6 @@ from plumbob.reference import Outcome, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.formats import urdf
 from plumbob.reference.judging import PoseJudgement
-from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..exchange import Answer, Exchange
@@ -19,13 +18,11 @@ from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import robot_targets, rounding
 from .report import report
-from .robot_models import FARTHEST, REDUNDANT, judgement_of, target_of
+from .robot_models import FARTHEST, judgement_of, target_of
 from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
 from .trajectories import Trajectory, is_falling_at, limit_laws, trajectories
 
 TASK = robot_targets.TASK
-# Coordinates that differ by less are the same answer [rad, m].
-SAME = 1e-9
 cases = robot_targets.cases
 
 
@@ -35,19 +32,18 @@ def judge(
     method: str,
 ) -> TaskReport:
     """Judge coordinates by the laws of poses."""
-    fails_at_zero = _fails_at_zero(exchanges)
     motions = trajectories(exchanges, trajectory_of)
+    pose_laws = PoseLaws(motions, greeting, _fails_at_zero(exchanges))
     judgements = [
         judge_case(
             exchange,
-            partial(_findings, exchange.case, motions, greeting, fails_at_zero),
+            partial(pose_laws.findings, exchange.case),
             rounding.repeats(greeting.epsilon, exchange.case.facts["size"]),
             robot_targets.timed_solve(exchange.case.inputs),
         )
         for exchange in exchanges
-    ]  # fmt: skip
-    words = sentence("Its answers do not depend on start.")
-    return report(TASK, method, judgements, words if _ignores_start(motions.values()) else None)
+    ]
+    return report(TASK, method, judgements)
 
 
 def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:
@@ -60,18 +56,6 @@ def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:
     return not all(claims.get(AT, [True])) and all(claims.get(CLOSE, [False]))
 
 
-def _ignores_start(motions: Iterable[Trajectory]) -> bool:
-    """Return whether robots with joints to spare have the same answer from different starts."""
-    answers: dict[bytes, list[FloatArray]] = {}
-    for motion in motions:
-        inputs = motion.inputs
-        is_redundant = len(inputs["start"]) >= REDUNDANT and inputs["effector"] >= REDUNDANT - 1
-        if is_redundant and motion.case.family in (AT, CLOSE, ANYWHERE):
-            answers.setdefault(inputs["target_position"].tobytes(), []).append(motion.q[0])
-    groups = [q for q in answers.values() if len(q) > 1]
-    return bool(groups) and all(np.ptp(q, axis=0).max() <= SAME for q in groups)
-
-
 def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
     """Return an answer as a motion of one frame."""
     q = np.clip(outputs["q"], -FARTHEST, FARTHEST)[None]
@@ -79,26 +63,62 @@ def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
     return Trajectory(case, q, None if is_claimed is None else bool(is_claimed))
 
 
-def _findings(
-    case: Case,
-    motions: Mapping[str, Trajectory],
-    greeting: Greeting,
-    fails_at_zero: bool,
-    outputs: Mapping[str, Any],
-) -> list[Finding]:
-    q = outputs.get("q")
-    if q is None:
-        return [finding("numbers, no coordinates")]
-    if case.name not in motions:
-        return [not_finite("numbers, of a joint", q)]
-    judgement = judgement_of(case.inputs, q)
-    limits = _limits(judgement, q, case, greeting)
-    stays = any(law.verdict for motion in motions.values()
-                for law in limit_laws(motion, motions.values()))  # fmt: skip
-    laws = [limits, *_target_laws(judgement, outputs, case, greeting, fails_at_zero, stays)]
-    if case.family == AT_A_LIMIT:
-        laws.append(finding("limits in the solve", motions[case.name].is_clamped[0]))
-    return [*laws, *limit_laws(motions[case.name], motions.values())]
+class PoseLaws:
+    """The laws of poses, given all answers."""
+
+    def __init__(
+        self, motions: Mapping[str, Trajectory], greeting: Greeting, fails_at_zero: bool
+    ) -> None:
+        self._motions, self._greeting, self._fails_at_zero = motions, greeting, fails_at_zero
+        self._at_limits = {
+            name: list(limit_laws(motion, motions.values())) for name, motion in motions.items()
+        }
+        self._stays = any(law.verdict for laws in self._at_limits.values() for law in laws)
+
+    def findings(self, case: Case, outputs: Mapping[str, Any]) -> list[Finding]:
+        """Return which laws an answer keeps."""
+        q = outputs.get("q")
+        if q is None:
+            return [finding("numbers, no coordinates")]
+        if case.name not in self._motions:
+            return [not_finite("numbers, of a joint", q)]
+        judgement = judgement_of(case.inputs, q)
+        laws = [_limits(judgement, q, case, self._greeting)]
+        laws += self._target_laws(judgement, outputs, case)
+        if case.family == AT_A_LIMIT:
+            laws.append(finding("limits in the solve", self._motions[case.name].is_clamped[0]))
+        return [*laws, *self._at_limits[case.name]]
+
+    def _target_laws(
+        self, judgement: PoseJudgement, outputs: Mapping[str, Any], case: Case
+    ) -> Iterator[Finding]:
+        """Yield whether the target is reached; from any start another minimum may be found.
+
+        A single iteration need not reach it, nor a solver of which joints stay at limits.
+        """
+        distance, angle = judgement.distance, judgement.angle
+        joints, epsilon = len(case.inputs["parents"]), self._greeting.epsilon
+        bound = judgement.tolerance + rounding.positions(epsilon, joints, case.facts["size"])
+        angle_bound = judgement.tolerance_rotation + rounding.rotations(epsilon, joints)
+        # The larger of both errors, in multiples of its bound.
+        error = max(distance / bound, angle / angle_bound)
+        if case.family not in UNREACHED:
+            is_hard = case.family in (ANYWHERE, AT_A_LIMIT)
+            verdict = Verdict.RIGHT_EXCEPT if is_hard else None
+            may_fall = is_hard and error > 1.0 and not self._stays
+            is_falling = may_fall and is_falling_at(self._motions[case.name])
+            key = "target reached, still falling" if is_falling else "target reached"
+            yield finding(key, distance, bound, verdict=verdict)
+            yield finding("rotation reached", angle, angle_bound, verdict=verdict)
+        claim = outputs.get("converged")
+        if claim is None or claim == (error <= 1.0):
+            return
+        key = "claims, success of a tool" if claim else "claims, failure of a tool"
+        if claim and distance <= bound:
+            key = "claims, success of a position"
+        if self._fails_at_zero and case.family == AT:
+            key = "claims, failure without error"
+        yield finding(key, abs(error - 1.0), distance=distance, angle=angle)
 
 
 def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greeting) -> Finding:
@@ -112,38 +132,6 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     is_wrappable = not case.inputs["slides"][joint] and lower - bound <= angle <= upper + bound
     key = "limits kept, not wrapped" if is_wrappable else "limits kept"
     return finding(key, excess[joint], bound, index=joint, value=float(q[joint]), angle=angle)
-
-
-def _target_laws(
-    judgement: PoseJudgement, outputs: Mapping[str, Any], case: Case, greeting: Greeting,
-    fails_at_zero: bool, stays: bool,
-) -> Iterator[Finding]:  # fmt: skip
-    """Yield whether the target is reached; from any start another minimum may be found.
-
-    A single iteration need not reach it, nor a solver of which joints stay at limits.
-    """
-    distance, angle = judgement.distance, judgement.angle
-    joints, size = len(case.inputs["parents"]), case.facts["size"]
-    bound = judgement.tolerance + rounding.positions(greeting.epsilon, joints, size)
-    angle_bound = judgement.tolerance_rotation + rounding.rotations(greeting.epsilon, joints)
-    # The larger of both errors, in multiples of its bound.
-    error = max(distance / bound, angle / angle_bound)
-    if case.family not in UNREACHED:
-        is_hard = case.family in (ANYWHERE, AT_A_LIMIT)
-        verdict = Verdict.RIGHT_EXCEPT if is_hard else None
-        is_falling = (
-            is_hard and error > 1.0 and not stays and is_falling_at(trajectory_of(case, outputs))
-        )
-        key = "target reached, still falling" if is_falling else "target reached"
-        yield finding(key, distance, bound, verdict=verdict)
-        yield finding("rotation reached", angle, angle_bound, verdict=verdict)
-    if "converged" in outputs and outputs["converged"] != (error <= 1.0):
-        key = "claims, success of a tool" if outputs["converged"] else "claims, failure of a tool"
-        if outputs["converged"] and distance <= bound:
-            key = "claims, success of a position"
-        if fails_at_zero and case.family == AT:
-            key = "claims, failure without error"
-        yield finding(key, abs(error - 1.0), distance=distance, angle=angle)
 
 
 def solve_by_reference(solver: str, /, **inputs: Any) -> Mapping[str, Any]:

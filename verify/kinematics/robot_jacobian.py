@@ -16,9 +16,9 @@ from ..exchange import Answer, Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints
-from . import robot_models, rounding
+from . import rounding
 from .report import report
-from .robot_models import Inputs, mechanism, tool_pose
+from .robot_models import Inputs, any_pose, mechanism, robots, tool_pose
 from .skeletons import suits
 
 TASK = "robot_jacobian"
@@ -27,21 +27,14 @@ _SEED = 1972
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
     """Return robots of one joint to seven, each in a random configuration."""
-    rng = np.random.default_rng([_SEED, seed])
-    return [
-        _case(f"{name}, pose {number + 1}", robot, rng)
-        for name, robot in robot_models.robots(rng).items()
-        if suits(robot["parents"], greeting, robot["effector"])
-        for number in range(5 if thorough else 2)
-    ]
-
-
-def _case(name: str, robot: Mapping[str, Any], rng: np.random.Generator) -> Case:
-    q = rng.uniform(robot["lower"], robot["upper"])
-    inputs = {**robot, "q": q, "urdf": robot_models.urdf(robot)}
-    about = sentence("A robot of {joints} joints.", joints=len(q))
-    facts = {"size": max(robot_models.size_of(robot), 1.0)}
-    return Case(name, TASK, inputs, "any configuration", about, facts=facts)
+    rng, cases = np.random.default_rng([_SEED, seed]), list[Case]()
+    for name, robot in robots(rng).items():
+        if suits(robot["parents"], greeting, robot["effector"]):
+            for number in range(5 if thorough else 2):
+                options = {"q": rng.uniform(robot["lower"], robot["upper"])}
+                label = f"{name}, pose {number + 1}"
+                cases.append(any_pose(label, TASK, "any configuration", robot, options))
+    return cases
 
 
 def _world(J: FloatArray, x: FloatArray, R: FloatArray) -> FloatArray:
@@ -89,54 +82,42 @@ def judge(
     method: str,
 ) -> TaskReport:
     """Compare Jacobians with the reference in the convention that suits them; name the faults."""
-    name, matches = best_convention(exchanges, greeting)
+    name, matches = _best_convention(exchanges, greeting)
     judgements = []
     for exchange in exchanges:
-        J = right_jacobian(exchange.case.inputs, CONVENTIONS[name])
-        laws = partial(_findings, exchange.case, J, greeting)
-        inputs = exchange.case.inputs
-        reference = partial(jacobian, mechanism(inputs), inputs["q"], -1)
-        allowed = rounding.repeats(greeting.epsilon, exchange.case.facts["size"])
-        count = digits(jacobian_gap(exchange, J), 1.0) if exchange.case.name in matches else None
+        case = exchange.case
+        J = right_jacobian(case.inputs, CONVENTIONS[name])
+        reference = partial(jacobian, mechanism(case.inputs), case.inputs["q"], -1)
+        allowed = rounding.repeats(greeting.epsilon, case.facts["size"])
+        count = digits(_gap(exchange, J), 1.0) if case.name in matches else None
+        laws = partial(_findings, case, J, greeting)
         judgements.append(judge_case(exchange, laws, allowed, reference, {"jacobian": J}, count))
     wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
     words = sentence("The Jacobian's convention: {convention}.", convention=name)
     return report(TASK, method, judgements, words if matches and not wrong else None)
 
 
-def best_convention(
+def _best_convention(
     exchanges: Sequence[Exchange], greeting: Greeting
 ) -> tuple[str, dict[str, bool]]:
     """Return the convention that suits most answers, and by case whether it suits."""
-    answered = [
-        exchange
-        for exchange in exchanges
-        if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values
-    ]
-    matches = {
-        name: {
-            exchange.case.name: _matches(
-                exchange, greeting, right_jacobian(exchange.case.inputs, convention)
-            )
-            for exchange in answered
-        }
-        for name, convention in CONVENTIONS.items()
-    }
+    matches: dict[str, dict[str, bool]] = {name: {} for name in CONVENTIONS}
+    for exchange in exchanges:
+        if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values:
+            bound = _bound(exchange.case, greeting)
+            for name, convention in CONVENTIONS.items():
+                gap = _gap(exchange, right_jacobian(exchange.case.inputs, convention))
+                matches[name][exchange.case.name] = gap <= bound
     name = max(matches, key=lambda name: sum(matches[name].values()))
     return name, matches[name]
 
 
-def jacobian_bound(case: Case, greeting: Greeting) -> float:
+def _bound(case: Case, greeting: Greeting) -> float:
     """Return how far rounding moves an entry of a Jacobian."""
     return rounding.positions(greeting.epsilon, len(case.inputs["q"]), case.facts["size"])
 
 
-def _matches(exchange: Exchange, greeting: Greeting, J: FloatArray) -> bool:
-    """Return whether an answer is a Jacobian."""
-    return jacobian_gap(exchange, J) <= jacobian_bound(exchange.case, greeting)
-
-
-def jacobian_gap(exchange: Exchange, J: FloatArray) -> float:
+def _gap(exchange: Exchange, J: FloatArray) -> float:
     """Return the largest difference of an answer from a Jacobian."""
     assert isinstance(exchange.answer, Answer)
     return float(np.abs(exchange.answer.values["jacobian"] - J).max())
@@ -150,4 +131,4 @@ def _findings(
         yield not_finite("numbers, of a joint", answer.sum(axis=0))
         return
     errors = np.abs(answer - J).max(axis=0)
-    yield of_joints("Jacobian", errors, jacobian_bound(case, greeting))
+    yield of_joints("Jacobian", errors, _bound(case, greeting))

@@ -1,8 +1,7 @@
 """Robots of joints with limits: as the reference's articulations and as URDF."""
 
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import reduce
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +23,7 @@ from plumbob.reference.rotation import roll_pitch_yaw
 from plumbob.reference.skeleton import Pose
 from plumbob.text.sentence import Sentence, sentence
 
-from ..judgement import CaseJudgement, Verdict
+from ..case import Case
 
 Inputs = Mapping[str, Any]
 ITERATIONS = 200
@@ -40,48 +39,6 @@ IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 _TEXT = Path(__file__).with_name("robots.toml").read_text(encoding="utf-8")
 
 
-# What some robots have and others lack.
-FEATURES: Sequence[tuple[Sentence, Callable[[Inputs], Any]]] = (
-    (sentence("slides"), lambda robot: robot["slides"].any()),
-    (sentence("coordinates beyond pi"),
-     lambda robot: (robot["lower"] > np.pi).any() or (robot["upper"] < -np.pi).any()),
-    (sentence("negative numbers in axes"), lambda robot: (robot["axes"] < 0.0).any()),
-    (sentence("axes along none of x, y and z"),
-     lambda robot: (np.abs(robot["axes"]).max(axis=-1) < 1.0).any()),
-    (sentence("rotated frames (orientations)"),
-     lambda robot: (robot["orientations"] != IDENTITY).any()),
-    (sentence("a rotated tool (tool_rotation)"),
-     lambda robot: (robot["tool_rotation"] != IDENTITY).any()),
-    (sentence("branches, or an effector that is not the last joint"),
-     lambda robot: not ancestors(robot).all()),
-    (sentence("fewer than six joints"), lambda robot: len(robot["axes"]) < REDUNDANT - 1),
-    (sentence("more joints than the tool has freedoms"),
-     lambda robot: len(robot["axes"]) >= REDUNDANT),
-)  # fmt: skip
-# A feature tells something if so many of the robots that have it get wrong answers.
-MIN_WRONG, WRONG_SHARE = 2, 0.25
-
-
-def feature_of(judgements: Sequence[CaseJudgement]) -> tuple[Sentence, ...]:
-    """Return what all robots with wrong answers have, and no robot without, () if nothing."""
-    is_wrong = np.array([judgement.verdict >= Verdict.WRONG for judgement in judgements])
-    shares: dict[float, list[Sentence]] = {}
-    for feature, has_feature in FEATURES if is_wrong.sum() >= MIN_WRONG else ():
-        is_marked = np.array([bool(has_feature(judgement.case.inputs)) for judgement in judgements])
-        if is_marked.any() and not is_marked.all() and not is_wrong[~is_marked].any():
-            shares.setdefault(float(is_wrong[is_marked].mean()), []).append(feature)
-    if max(shares, default=0.0) < WRONG_SHARE:
-        return ()
-    features = reduce(
-        lambda one, other: sentence("{one} or {other}", one=one, other=other), shares[max(shares)]
-    )
-    words = sentence(
-        "All wrong answers are for robots with {feature}; for those without all are right.",
-        feature=features,
-    )
-    return (words,)
-
-
 def ancestors(inputs: Inputs) -> FloatArray:
     """Return 1 for the joints that move the tool, 0 for the others, (joint,)."""
     moves, j = np.zeros(len(inputs["parents"])), inputs["effector"]
@@ -90,7 +47,7 @@ def ancestors(inputs: Inputs) -> FloatArray:
     return moves
 
 
-def mechanism(inputs: Mapping[str, Any]) -> Articulation:
+def mechanism(inputs: Inputs) -> Articulation:
     """Return the robot of a request: a fixed base, its joints in their order, the tool."""
     Z = [0.0, 0.0, 1.0]
     parents = [-1, *(inputs["parents"] + 1), inputs["effector"] + 1]
@@ -105,7 +62,7 @@ def mechanism(inputs: Mapping[str, Any]) -> Articulation:
     )
 
 
-def tool_pose(inputs: Mapping[str, Any], q: FloatArray) -> Pose:
+def tool_pose(inputs: Inputs, q: FloatArray) -> Pose:
     """Return the tool's position [m], (..., 3), and rotation, (..., 4), at coordinates q."""
     return tool_at(mechanism(inputs), q)
 
@@ -116,19 +73,26 @@ def tool_at(robot: Articulation, q: FloatArray) -> Pose:
     return Pose(pose.positions[..., -1, :], pose.rotations[..., -1, :])
 
 
-def target_of(inputs: Mapping[str, Any]) -> Target:
+def twists_between(start: Pose, end: Pose) -> FloatArray:
+    """Return displacements [m] and rotation vectors [rad] from poses to others, (..., 6)."""
+    turns = rotation.multiply(end.rotations, rotation.conjugate(start.rotations))
+    shifts = end.positions - start.positions
+    return np.concatenate([shifts, rotation.logarithm(turns)], axis=-1)
+
+
+def target_of(inputs: Inputs) -> Target:
     """Return the target of a request's tool."""
     return Target(inputs["target_position"], inputs["target_rotation"], -1)
 
 
-def judgement_of(inputs: Mapping[str, Any], q: FloatArray) -> PoseJudgement:
+def judgement_of(inputs: Inputs, q: FloatArray) -> PoseJudgement:
     """Return how far the tool is from its target at coordinates q, and these from their limits."""
     q = np.clip(q, -FARTHEST, FARTHEST)
     tolerances = {name: inputs[name] for name in ("tolerance", "tolerance_rotation")}
     return judge_pose(mechanism(inputs), q, target_of(inputs), **tolerances)
 
 
-def size_of(robot: Mapping[str, Any]) -> float:
+def size_of(robot: Inputs) -> float:
     """Return the sum of a robot's lengths, slides at their longest [m]."""
     lower, upper = robot["lower"], robot["upper"]
     slides = np.max([upper - lower, np.abs(lower), np.abs(upper)], axis=0)
@@ -136,7 +100,7 @@ def size_of(robot: Mapping[str, Any]) -> float:
     return float(reach + robot["slides"] @ slides)
 
 
-def urdf(inputs: Mapping[str, Any]) -> str:
+def urdf(inputs: Inputs) -> str:
     """Return a robot as URDF: links base, link_0 and so on, and the tool."""
     count = len(inputs["parents"])
     links = [f'<link name="{link}"/>' for link in ("base", *map(_link, range(count)), "tool")]
@@ -151,7 +115,7 @@ def _link(j: int) -> str:
     return f"link_{j}" if j >= 0 else "base"
 
 
-def _urdf_joint(inputs: Mapping[str, Any], j: int) -> str:
+def _urdf_joint(inputs: Inputs, j: int) -> str:
     kind = "prismatic" if inputs["slides"][j] else "revolute"
     lower, upper = (float(inputs[name][j]) for name in ("lower", "upper"))
     return (
@@ -173,7 +137,7 @@ def _numbers(vector: Iterable[float]) -> str:
 
 
 def solved(
-    robot: Mapping[str, Any], start: FloatArray, tool: Pose, solver: str = "levenberg_marquardt"
+    robot: Inputs, start: FloatArray, tool: Pose, solver: str = "levenberg_marquardt"
 ) -> tuple[FloatArray, bool]:
     """Return the coordinates of a solver of the reference, and whether they reach the target."""
     solution = solve_ik(
@@ -183,51 +147,57 @@ def solved(
     return solution.coordinates, bool(solution.outcome == Outcome.CONVERGED)
 
 
+def robot_case(
+    name: str, task: str, family: str, robot: Inputs, options: Mapping[str, Any],
+    facts: Mapping[str, Any], about: Sentence | None = None,
+) -> Case:  # fmt: skip
+    """Return a request about a robot, whose URDF has the limits of the options."""
+    inputs = {**robot, **options}
+    inputs["urdf"] = urdf(inputs)
+    words = sentence("A robot of {joints} joints.", joints=len(robot["axes"]))
+    return Case(name, task, inputs, family, about or words, facts=facts)
+
+
+def any_pose(name: str, task: str, family: str, robot: Inputs, options: Inputs) -> Case:
+    """Return a request about a robot at coordinates q among the options."""
+    facts = {"size": max(size_of(robot), 1.0)}
+    return robot_case(name, task, family, robot, options, facts)
+
+
 def robots(rng: np.random.Generator) -> dict[str, dict[str, Any]]:
     """Return the robots of `robots.toml` by name, two with random frames among them."""
-    table = tomllib.loads(_TEXT)
-    last = table.pop("last")  # so that the random numbers of the other robots do not depend on them
-    limits = {name: _limits(entry) for name, entry in last.items()}
     return {
-        **{name: _robot(**entry) for name, entry in table.items()},
-        **{f"seven hinges in rotated frames {i}": _random_frames(rng) for i in range(1, 3)},
-        **{name: _robot(**entry) | limits[name] for name, entry in last.items()},
+        name: _robot(_random_frames(rng) if entry.get("random") else entry)
+        for name, entry in tomllib.loads(_TEXT).items()
     }
-
-
-def _limits(entry: dict[str, Any]) -> dict[str, FloatArray]:
-    """Take the limits out of an entry of `robots.toml`, {} if it has the usual ones."""
-    return {name: np.array(entry.pop(name)) for name in ("lower", "upper") if name in entry}
 
 
 def _random_frames(rng: np.random.Generator) -> dict[str, Any]:
-    """Return a robot with random frames and axes."""
+    """Return an entry with random frames and axes."""
     axes = rng.standard_normal((7, 3))
-    return _robot(
-        axes / np.linalg.norm(axes, axis=1, keepdims=True), 0.3 * rng.standard_normal((7, 3)),
-        orientations=rotation.random(rng, 7), tool=[0.1, -0.1, 0.2],
-        tool_rotation=rotation.random(rng),
-    )  # fmt: skip
-
-
-def _robot(
-    axes: Any, origins: Any, slides: Any = None, *, parents: Any = None, orientations: Any = None,
-    effector: int | None = None, tool: Any = (0.0, 0.0, 0.1),
-    tool_rotation: Any = (1.0, 0.0, 0.0, 0.0),
-) -> dict[str, Any]:  # fmt: skip
-    count = len(axes)
-    slides = np.zeros(count, dtype=bool) if slides is None else np.array(slides)
     return {
-        "parents": np.array(np.arange(count) - 1 if parents is None else parents),
-        "origins": np.array(origins, dtype=float),
-        "orientations": np.array(
-            rotation.identity(count) if orientations is None else orientations
-        ),
-        "axes": np.array(axes, dtype=float),
+        "axes": axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        "origins": 0.3 * rng.standard_normal((7, 3)),
+        "orientations": rotation.random(rng, 7),
+        "tool_position": [0.1, -0.1, 0.2],
+        "tool_rotation": rotation.random(rng),
+    }
+
+
+def _robot(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the robot of an entry: what the entry lacks is the usual."""
+    count = len(entry["axes"])
+    slides = np.array(entry.get("slides", np.zeros(count, dtype=bool)))
+    usual = {
+        "parents": np.arange(count) - 1,
+        "origins": np.zeros((count, 3)),
+        "orientations": rotation.identity(count),
+        "axes": np.zeros((count, 3)),
         "slides": slides,
         "lower": np.where(slides, -0.2, -2.2),
         "upper": np.where(slides, 0.3, 2.4),
-        "effector": count - 1 if effector is None else effector,
-        "tool_position": np.array(tool, dtype=float),
-        "tool_rotation": np.array(tool_rotation, dtype=float),
+        "tool_position": np.array([0.0, 0.0, 0.1]),
+        "tool_rotation": IDENTITY,
     }
+    robot = {name: np.array(entry.get(name, v), dtype=v.dtype) for name, v in usual.items()}
+    return {**robot, "effector": entry.get("effector", count - 1)}

@@ -11,7 +11,6 @@ from plumbob.reference import rotation, solve_ik
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
-from plumbob.text.sentence import sentence
 
 from ..case import Case
 from ..greeting import Greeting
@@ -22,14 +21,16 @@ from .robot_models import (
     PRECISION,
     REDUNDANT,
     TOLERANCES,
+    Inputs,
     ancestors,
     mechanism,
+    robot_case,
     robots,
     size_of,
     solved,
     target_of,
     tool_pose,
-    urdf,
+    twists_between,
 )
 from .skeletons import suits
 
@@ -79,10 +80,10 @@ _SEED = 1955
 
 
 class ToolRequest(NamedTuple):
-    """A pose that a robot's tool is to have."""
+    """A pose that a robot's tool is to have, or the poses of all frames of a motion."""
 
     family: str
-    robot: Mapping[str, Any]
+    robot: Inputs
     start: FloatArray
     tool: Pose  # the target
     options: Mapping[str, Any] = {}  # inputs other than most requests'
@@ -107,26 +108,23 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
 
 
 def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
-    robot = request.robot
-    inputs = {
-        **robot,
+    robot, family = request.robot, request.family
+    options = {
         "start": request.start,
         "target_position": request.tool.positions,
         "target_rotation": request.tool.rotations,
         "tolerance": tolerance * max(size_of(robot), 1.0),
         "tolerance_rotation": tolerance,
         "max_iterations": ITERATIONS,
-        "urdf": urdf(robot),
         **request.options,
     }
-    about = sentence("A robot of {joints} joints.", joints=len(request.start))
-    is_reachable = np.array([request.family not in (BEYOND, TIGHT, FEW)])
+    is_reachable = np.array([family not in (BEYOND, TIGHT, FEW)])
     facts = {"size": size_of(robot), "reachable": is_reachable, **request.facts}
-    return Case(name, TASK, inputs, request.family, about, facts=facts)
+    return robot_case(name, TASK, family, robot, options, facts)
 
 
 def _requests(
-    name: str, robot: dict[str, Any], tolerance: float, rng: np.random.Generator
+    name: str, robot: Inputs, tolerance: float, rng: np.random.Generator
 ) -> Iterator[ToolRequest]:
     """Yield the requests of a robot: those that the fewest robots show come last."""
     lower, upper, joints = robot["lower"], robot["upper"], len(robot["lower"])
@@ -167,7 +165,7 @@ def _requests(
     yield from _far_rotations(name, robot)
 
 
-def _far_rotations(name: str, robot: Mapping[str, Any]) -> Iterator[ToolRequest]:
+def _far_rotations(name: str, robot: Inputs) -> Iterator[ToolRequest]:
     """Yield targets nearly half a turn away, and tools that are rotated across half a turn."""
     if name == "one hinge":
         ends = 0.5 * NEARLY_HALF * np.array([[-1.0], [1.0]])
@@ -181,7 +179,7 @@ def _far_rotations(name: str, robot: Mapping[str, Any]) -> Iterator[ToolRequest]
 
 
 def _of_both_signs(
-    family: str, robot: Mapping[str, Any], start: FloatArray, answer: FloatArray
+    family: str, robot: Inputs, start: FloatArray, answer: FloatArray
 ) -> Iterator[ToolRequest]:
     """Yield requests for the tool's pose at an answer, its quaternion of either sign."""
     tool = tool_pose(robot, answer)
@@ -190,39 +188,42 @@ def _of_both_signs(
         yield ToolRequest(family, robot, start, target)
 
 
-def _single_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
+def _single_steps(robot: Inputs, rng: np.random.Generator) -> Iterator[ToolRequest]:
     unlimited = np.full(len(robot["lower"]), UNLIMITED)
+    options = {"max_iterations": 1, "lower": -unlimited, "upper": unlimited}
     for _ in range(2):
         answer = _middle(robot, rng)
-        start = answer + _distances(robot) * rng.uniform(-1.0, 1.0, len(answer))
-        options = {"max_iterations": 1, "lower": -unlimited, "upper": unlimited}
-        options["urdf"] = urdf({**robot, **options})
+        start = _near(robot, answer, rng)
         yield ToolRequest(STEP, robot, start, tool_pose(robot, answer), options)
 
 
-def _draw_limited(robot: dict[str, Any], rng: np.random.Generator) -> ToolRequest | None:
+def _draw_limited(robot: Inputs, rng: np.random.Generator) -> ToolRequest | None:
     """Return limits that one joint would leave on its way to a target, if the others suffice.
 
     By Klein and Huang (1983), a step of least length of all joints has a share of the joint that is
     the diagonal entry of J^+ J.
     """
     start = _middle(robot, rng)
-    target = tool_pose(robot, start + _distances(robot) * rng.uniform(-1.0, 1.0, len(start)))
+    target = tool_pose(robot, _near(robot, start, rng))
     changes = solved(robot, start, target)[0] - start
     J = jacobian(mechanism(robot), start, -1)
     is_spare = (np.diag(np.linalg.pinv(J) @ J) < SHARE) & ~robot["slides"]
     joint = int(np.argmax(np.abs(changes) * is_spare))
     side = "upper" if changes[joint] > 0.0 else "lower"
-    limits = robot[side].copy()
-    limits[joint] = start[joint] + 0.3 * changes[joint]
-    limited = {**robot, side: limits}
+    limited = _limited(robot, side, joint, start[joint] + 0.3 * changes[joint])
     solvers = ("levenberg_marquardt", "damped_least_squares")
     results = [solved(limited, start, target, solver) for solver in solvers]
     is_solvable = is_spare[joint] and all(is_reached for _, is_reached in results)
     return ToolRequest(AT_A_LIMIT, limited, start, target) if is_solvable else None
 
 
-def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
+def _limited(robot: Inputs, side: str, joint: int, limit: float) -> Inputs:
+    """Return the robot with another limit of a joint."""
+    is_joint = np.arange(len(robot[side])) == joint
+    return {**robot, side: np.where(is_joint, limit, robot[side])}
+
+
+def limited_steps(robot: Inputs, rng: np.random.Generator) -> Iterator[ToolRequest]:
     """Yield single iterations from a joint's limit, which its step leaves or would pass.
 
     The joint is neither the first nor the last, so that steps of other joints show.
@@ -230,32 +231,28 @@ def limited_steps(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterato
     for is_leaving in (True, False):
         for _ in range(DRAWS):
             start = _middle(robot, rng)
-            target = tool_pose(robot, start + _distances(robot) * rng.uniform(-1, 1, len(start)))
+            target = tool_pose(robot, _near(robot, start, rng))
             steps = _steps(robot, start, target)
             is_clear = (np.sign(steps) == np.sign(steps[0])).all(axis=0)
             is_clear &= np.abs(steps).min(axis=0) > CLEAR
             if is_clear[1:-1].any():
                 joint = 1 + int(np.argmax(is_clear[1:-1]))
                 side = "lower" if (steps[0, joint] > 0.0) == is_leaving else "upper"
-                limits = robot[side].copy()
-                limits[joint] = start[joint]
+                limited, options = _limited(robot, side, joint, start[joint]), {"max_iterations": 1}
                 facts = {"held": joint, "is_leaving": is_leaving}
-                limited, options = {**robot, side: limits}, {"max_iterations": 1}
                 yield ToolRequest(LIMIT_STEP, limited, start, target, options, facts)
                 break
 
 
-def _steps(robot: Mapping[str, Any], start: FloatArray, tool: Pose) -> FloatArray:
+def _steps(robot: Inputs, start: FloatArray, tool: Pose) -> FloatArray:
     """Return steps along the gradient and with several dampings, the longest joint's 1."""
-    here, J = tool_pose(robot, start), jacobian(mechanism(robot), start, -1)
-    turn = rotation.multiply(tool.rotations, rotation.conjugate(here.rotations))
-    error = np.concatenate([tool.positions - here.positions, rotation.logarithm(turn)])
+    J, error = jacobian(mechanism(robot), start, -1), twists_between(tool_pose(robot, start), tool)
     steps = [J.T @ error]
     steps += [J.T @ np.linalg.solve(J @ J.T + d * np.eye(6), error) for d in STEP_DAMPINGS]
     return np.array([step / np.abs(step).max() for step in steps])
 
 
-def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator[ToolRequest]:
+def tight_limits(robot: Inputs, rng: np.random.Generator) -> Iterator[ToolRequest]:
     """Yield targets far beyond limits that differ from joint to joint."""
     scale = np.where(robot["slides"], SLIDE, 1.0)
     for _ in range(3):
@@ -267,7 +264,7 @@ def tight_limits(robot: Mapping[str, Any], rng: np.random.Generator) -> Iterator
 
 
 def off_by_tolerances(
-    robot: Mapping[str, Any], tolerances: FloatArray, rng: np.random.Generator
+    robot: Inputs, tolerances: FloatArray, rng: np.random.Generator
 ) -> Iterator[ToolRequest]:
     """Yield starts whose position or rotation is off by multiples of two sizes of tolerances."""
     pose = tool_pose(robot, BENT)
@@ -285,9 +282,7 @@ def off_by_tolerances(
                 yield ToolRequest(TOLERANCE, robot, BENT, target, options)
 
 
-def half_turns(
-    robot: Mapping[str, Any], start: FloatArray, angle: float = NEARLY_HALF
-) -> Iterator[Mapping[str, Any]]:
+def half_turns(robot: Inputs, start: FloatArray, angle: float = NEARLY_HALF) -> Iterator[Inputs]:
     """Yield the robot with tools that are rotated by nearly half a turn about x, y and z."""
     for axis in np.eye(3) + 0.1:
         turn = rotation.exponential(angle * axis / np.linalg.norm(axis))
@@ -295,18 +290,19 @@ def half_turns(
         yield {**robot, "tool_rotation": rotation.multiply(rotation.conjugate(flange), turn)}
 
 
-def _distances(robot: Mapping[str, Any]) -> FloatArray:
-    """Return how far joints may be from an answer at the start."""
-    return np.where(robot["slides"], SLIDE * DISTANCE, DISTANCE)
+def _near(robot: Inputs, q: FloatArray, rng: np.random.Generator) -> FloatArray:
+    """Return coordinates at some distance from others."""
+    distances = np.where(robot["slides"], SLIDE * DISTANCE, DISTANCE)
+    return np.asarray(q + distances * rng.uniform(-1.0, 1.0, len(q)))
 
 
-def _middle(robot: Mapping[str, Any], rng: np.random.Generator) -> FloatArray:
+def _middle(robot: Inputs, rng: np.random.Generator) -> FloatArray:
     """Return coordinates well within the limits."""
     lower, upper = robot["lower"], robot["upper"]
     return np.asarray(lower + (upper - lower) * rng.uniform(0.3, 0.7, len(lower)))
 
 
-def timed_solve(inputs: Mapping[str, Any]) -> Callable[[], object]:
+def timed_solve(inputs: Inputs) -> Callable[[], object]:
     """Return the call of the reference that answers a request, to be timed."""
     options = {name: inputs[name] for name in PRECISION}
     return partial(

@@ -67,12 +67,6 @@ def judge(
     return report(TASK, method, judgements)
 
 
-def speed_ratios(motion: Trajectory) -> FloatArray:
-    """Return speeds as multiples of the greatest ones, (frame, joint)."""
-    speeds = np.abs(motion.changes) / motion.inputs["h"]
-    return np.asarray(speeds / motion.inputs["velocity_limits"])
-
-
 def _findings(
     name: str, motions: Mapping[str, Trajectory], greeting: Greeting, outputs: Mapping[str, Any]
 ) -> list[Finding]:
@@ -245,10 +239,10 @@ def _velocities(motion: Trajectory) -> Iterator[Finding]:
     """Yield whether joints keep their greatest speeds, and whether reported speeds are theirs."""
     h, changes, velocities = motion.inputs["h"], motion.changes, motion.velocities
     if "velocity_limits" in motion.inputs:
-        ratios = speed_ratios(motion)
+        speeds = np.abs(changes) / h
+        ratios = speeds / motion.inputs["velocity_limits"]
         frame, joint = divmod(int(np.argmax(ratios)), ratios.shape[1])
-        speed = float(np.abs(changes[frame, joint]) / h)
         yield _at(frame, finding("velocity limits kept", ratios.max(), 1.0 + 1e-6, index=joint,
-                                 speed=speed))  # fmt: skip
+                                 speed=float(speeds[frame, joint])))  # fmt: skip
     if velocities is not None:
         yield finding("velocities and coordinates", np.abs(changes - h * velocities).max(), AT_REST)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Articulation, rotation
+from plumbob.reference import Articulation
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
@@ -18,10 +18,9 @@ from ..exchange import Answer, Exchange, Failure
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
-from . import robot_models, rounding
+from . import rounding
 from .report import report
-from .robot_jacobian import CONVENTIONS, Convention, right_jacobian
-from .robot_models import Inputs, mechanism, tool_pose
+from .robot_models import Inputs, any_pose, mechanism, robots
 from .skeletons import suits
 
 TASK = "robot_velocity"
@@ -35,8 +34,6 @@ LARGEST_LOSS = 0.25
 # Speeds beyond so many times those of least length come from a division by almost zero.
 FACTOR = 1e3
 SINGULAR = "a singular pose"
-# Frames in which the singular values of a Jacobian differ.
-FRAMES = [CONVENTIONS[f"{frame}, linear part first"] for frame in ("world", "spatial")]
 # A Jacobian, and the velocity that the speeds give by it.
 Equation = tuple[FloatArray, FloatArray]
 
@@ -46,15 +43,13 @@ def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Ca
     rng = np.random.default_rng([_SEED, seed])
     return [
         case
-        for name, robot in robot_models.robots(rng).items()
+        for name, robot in robots(rng).items()
         if suits(robot["parents"], greeting, robot["effector"])
         for case in _cases_of(name, robot, rng, 4 if thorough else 2)
     ]
 
 
-def _cases_of(
-    name: str, robot: Mapping[str, Any], rng: np.random.Generator, count: int
-) -> Iterator[Case]:
+def _cases_of(name: str, robot: Inputs, rng: np.random.Generator, count: int) -> Iterator[Case]:
     draws = rng.uniform(robot["lower"], robot["upper"], (DRAWS, len(robot["lower"])))
     rank = len(singular_values(robot, draws[0]))
     regular = (q for q in draws if _is_regular(singular_values(robot, q), rank))
@@ -66,20 +61,15 @@ def _cases_of(
         yield replace(case, requirement="may")
 
 
-def _case(
-    name: str, robot: Mapping[str, Any], q: FloatArray, rng: np.random.Generator, family: str
-) -> Case:
+def _case(name: str, robot: Inputs, q: FloatArray, rng: np.random.Generator, family: str) -> Case:
     """Return a request for a velocity that the tool can have."""
     J = jacobian(mechanism(robot), q, -1)
     twist = J @ (rng.choice([-1.0, 1.0], len(q)) * rng.uniform(0.5, 1.5, len(q)))
     velocities = {"linear_velocity": twist[:3], "angular_velocity": twist[3:]}
-    inputs = {**robot, "q": q, **velocities, "urdf": robot_models.urdf(robot)}
-    about = sentence("A robot of {joints} joints.", joints=len(q))
-    facts = {"size": max(robot_models.size_of(robot), 1.0)}
-    return Case(name, TASK, inputs, family, about, facts=facts)
+    return any_pose(name, TASK, family, robot, {"q": q, **velocities})
 
 
-def singular_values(robot: Mapping[str, Any], q: FloatArray) -> FloatArray:
+def singular_values(robot: Inputs, q: FloatArray) -> FloatArray:
     """Return the singular values of the Jacobian other than zero, the largest first."""
     values = np.linalg.svd(jacobian(mechanism(robot), q, -1), compute_uv=False)
     return np.array(values[values > RANK * values[0]])
@@ -89,12 +79,10 @@ def _is_regular(values: FloatArray, rank: int) -> bool:
     return len(values) == rank and bool(values[0] <= CONDITION * values[-1])
 
 
-def right_equation(inputs: Inputs, frame: Convention = FRAMES[0]) -> Equation:
-    """Return the equation that right speeds solve, in the world or for the point at its origin."""
+def right_equation(inputs: Inputs) -> Equation:
+    """Return the equation that right speeds solve."""
     twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
-    tool = tool_pose(inputs, inputs["q"])
-    R = rotation.to_matrix(tool.rotations)
-    return right_jacobian(inputs, frame), frame(twist[:, None], tool.positions, R)[:, 0]
+    return jacobian(mechanism(inputs), inputs["q"], -1), twist
 
 
 def shortest_speeds(equation: Equation) -> FloatArray:
@@ -103,14 +91,7 @@ def shortest_speeds(equation: Equation) -> FloatArray:
     return np.asarray(np.linalg.pinv(J, RANK) @ twist)
 
 
-def _speeds(robot: Articulation, q: FloatArray, twist: FloatArray) -> FloatArray:
-    """Return the same from the robot itself: what is timed."""
-    return shortest_speeds((jacobian(robot, q, -1), twist))
-
-
-def solving(
-    equation: Equation, speeds: FloatArray, largest_loss: float = 1.0
-) -> tuple[FloatArray, float]:
+def solving(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, float]:
     """Return the speeds that solve an equation, those nearest to an answer, and their damping d.
 
     Along a singular vector damped least squares give s b / (s^2 + d^2) for the velocity b
@@ -125,8 +106,6 @@ def solving(
     i = int(np.argmax(np.abs(b) / np.maximum(s, 1e-300)))
     if c[i]:
         square = max(float(s[i] * b[i] / c[i] - s[i] ** 2), 0.0)
-    if largest_loss < 1.0:
-        square = min(square, float(s[-1]) ** 2 * largest_loss / (1.0 - largest_loss))
     parts = s * b / np.maximum(s**2 + square, 1e-300)
     return speeds + (parts - c) @ V, float(np.sqrt(square))
 
@@ -147,9 +126,9 @@ def _judgement(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
     equation = right_equation(case.inputs)
     laws = partial(_findings, case, equation, greeting)
     shortest = shortest_speeds(equation)
-    allowed = rounded_velocity(case, greeting) * max(1.0, float(np.abs(shortest).max()))
     rank = len(singular_values(case.inputs, case.inputs["q"]))
     expected = {"velocities": shortest} if rank == len(shortest) else {}
+    allowed = _rounded_velocity(case, greeting, shortest)
     reference = partial(_speeds, mechanism(case.inputs), case.inputs["q"], equation[1])
     judgement = judge_case(exchange, laws, allowed, reference, expected)
     if case.family == SINGULAR and isinstance(exchange.answer, Failure):
@@ -158,10 +137,16 @@ def _judgement(exchange: Exchange, greeting: Greeting) -> CaseJudgement:
     return judgement
 
 
-def rounded_velocity(case: Case, greeting: Greeting) -> float:
-    """Return how far rounding moves speeds of 1 rad/s, and what they do to the tool."""
+def _speeds(robot: Articulation, q: FloatArray, twist: FloatArray) -> FloatArray:
+    """Return the speeds of least length from the robot itself: what is timed."""
+    return shortest_speeds((jacobian(robot, q, -1), twist))
+
+
+def _rounded_velocity(case: Case, greeting: Greeting, speeds: FloatArray) -> float:
+    """Return how far rounding moves speeds, and what they do to the tool."""
     joints = len(case.inputs["q"])
-    return CONDITION * rounding.positions(greeting.epsilon, joints, case.facts["size"])
+    rounded = CONDITION * rounding.positions(greeting.epsilon, joints, case.facts["size"])
+    return rounded * max(1.0, float(np.abs(speeds).max()))
 
 
 def _findings(
@@ -176,7 +161,7 @@ def _findings(
             "speeds", np.abs(speeds).max() / np.abs(shortest_speeds(equation)).max(), FACTOR
         )
     J, twist = equation
-    bound = rounded_velocity(case, greeting) * max(1.0, float(np.abs(speeds).max()))
+    bound = _rounded_velocity(case, greeting, speeds)
     nearest, damping = solving(equation, speeds)
     loss = float(np.linalg.norm(J @ speeds - twist) / np.linalg.norm(twist))
     is_damped = np.abs(nearest - speeds).max() <= bound and (is_singular or loss <= LARGEST_LOSS)
@@ -193,6 +178,6 @@ def _behaviour(judgements: Sequence[CaseJudgement], greeting: Greeting) -> Sente
         if isinstance(judgement.answer, Answer) and judgement.case.family != SINGULAR:
             speeds = judgement.answer.values["velocities"]
             excess = np.abs(speeds - shortest_speeds((J, J @ speeds))).max()
-            if excess > rounded_velocity(judgement.case, greeting) * max(1.0, np.abs(speeds).max()):
+            if excess > _rounded_velocity(judgement.case, greeting, speeds):
                 return sentence("Joints also move where that does not move the tool.")
     return sentence("Among the speeds that solve a request it gives those of least length.")

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Target, rotation, solve_ik
+from plumbob.reference import Target, solve_ik
 from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.reference.jacobians import jacobian
 from plumbob.reference.skeleton import Pose
@@ -16,7 +16,7 @@ from ..case import Case
 from ..exchange import Answer, Exchange
 from ..judgement import Finding
 from ..laws import finding
-from .robot_models import ancestors, mechanism, tool_pose
+from .robot_models import ancestors, mechanism, tool_pose, twists_between
 from .robot_motions import ITERATIONS
 from .robot_targets import LIMIT_STEP
 
@@ -33,13 +33,6 @@ RELEASES, ENOUGH_JOINTS = 10, 6
 # Joints that a solver has clamped leave their limits so far [rad, m]: what is left of slow
 # iterations is less.
 RELEASED = 0.03
-
-
-def twists_between(start: Pose, end: Pose) -> FloatArray:
-    """Return displacements [m] and rotation vectors [rad] from poses to others, (..., 6)."""
-    turns = rotation.multiply(end.rotations, rotation.conjugate(start.rotations))
-    shifts = end.positions - start.positions
-    return np.concatenate([shifts, rotation.logarithm(turns)], axis=-1)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,23 +1,28 @@
 """What answers about robots show: of poses and motions, of single iterations, of Jacobians."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import BoolArray, FloatArray
-from plumbob.reference.jacobians import jacobian
 from plumbob.text.sentence import Sentence, sentence
 
 from ..exchange import Answer
-from ..judgement import CaseJudgement
+from ..judgement import CaseJudgement, Verdict
 from ..kinematics import robot_jacobian, robot_targets, robot_velocity
-from ..kinematics.robot_models import ancestors, mechanism, tool_pose
+from ..kinematics.robot_models import (
+    IDENTITY,
+    REDUNDANT,
+    Inputs,
+    ancestors,
+    tool_pose,
+)
 from ..kinematics.robot_motions import TASK as TRACK
 from ..kinematics.trajectories import AT_LIMIT, EXACT, LENIENT, Trajectory
 from .fits import fit, formula, is_sum
-from .separation import Findings, Statement
+from .joints import sound_cases
+from .separation import ElementTable, Findings, Statement
 
 TASKS = (robot_targets.TASK, TRACK, robot_jacobian.TASK, robot_velocity.TASK)
 # Fewer answers, frames or joints say nothing.
@@ -34,14 +39,65 @@ SAME_ENTRY = 1e-5
 def robot_evidence(task: str, judgements: Sequence[CaseJudgement]) -> Findings:
     """Return what the answers to a task of robots show."""
     answered = [j for j in judgements if isinstance(j.answer, Answer)]
+    tables = {"robot_answer": _wrong_robots(answered)}
     if task == robot_jacobian.TASK:
-        words = list(_parts_of_jacobians(answered))
+        words = list(_factors_of_jacobians(answered, tables))
     elif task == robot_velocity.TASK:
-        words = list(_factors(*_tool_velocities(answered), _VELOCITY))
+        words = list(_tool_velocities(answered))
     else:
         motions = [_motion(j) for j in answered if _is_finite(j)]
         words = [words for observe in OBSERVATIONS for words in observe(motions)]
-    return Findings({}, [Statement(float(i), w, True) for i, w in enumerate(words)], [])
+        tables |= _joint_tables(motions, sound_cases(judgements))
+    return Findings(tables, [Statement(float(i), w, True) for i, w in enumerate(words)], [])
+
+
+def _wrong_robots(judgements: Sequence[CaseJudgement]) -> ElementTable:
+    """Return which robots have wrong answers, by what some robots have and others lack."""
+    table = ElementTable("robot_answer", is_of_cases=True)
+    for judgement in judgements:
+        is_wrong = float(judgement.verdict >= Verdict.WRONG)
+        table.add(judgement.case.name, is_wrong, _robot_features(judgement.case.inputs))
+    return table
+
+
+def _robot_features(robot: Inputs) -> dict[str, bool]:
+    count, axes = len(robot["axes"]), robot["axes"]
+    return {
+        "slides": robot["slides"].any(),
+        "beyond_pi": (robot["lower"] > np.pi).any() or (robot["upper"] < -np.pi).any(),
+        "negative_axes": (axes < 0.0).any(),
+        "oblique_axes": (np.abs(axes).max(axis=-1) < 1.0).any(),
+        "rotated_frames": (robot["orientations"] != IDENTITY).any(),
+        "rotated_tool": (robot["tool_rotation"] != IDENTITY).any(),
+        "branches": not ancestors(robot).all(),
+        "few_joints": count < REDUNDANT - 1,
+        "spare_joints": count >= REDUNDANT,
+    }
+
+
+def _joint_features(robot: Inputs) -> dict[str, BoolArray]:
+    joints = np.arange(len(robot["axes"]))
+    return {
+        "root": joints == 0,
+        "last_joint": joints == len(joints) - 1,
+        "slide": robot["slides"],
+    }
+
+
+def _joint_tables(motions: Sequence[Trajectory], sound: frozenset[str]) -> dict[str, ElementTable]:
+    """Return which joints leave which limits, and which never move though they move the tool."""
+    limits, moves = ElementTable("robot_limit", sound), ElementTable("robot_movement", sound)
+    for motion in motions:
+        name, features = motion.case.name, _joint_features(motion.inputs)
+        excess = [motion.inputs["lower"] - motion.q, motion.q - motion.inputs["upper"]]
+        of_sides = {key: np.tile(column, 2) for key, column in features.items()}
+        of_sides["upper"] = np.repeat([False, True], motion.q.shape[1])
+        limits.add(name, np.max(excess, axis=1).ravel(), of_sides, AT_LIMIT)
+        is_still = (np.abs(motion.changes) <= EXACT).all(axis=0)
+        moves_tool = ancestors(motion.inputs) > 0.0
+        if not is_still.all():
+            moves.add(name, is_still, features, is_counted=moves_tool)
+    return {"robot_limit": limits, "robot_movement": moves}
 
 
 def _is_finite(judgement: CaseJudgement) -> bool:
@@ -96,7 +152,7 @@ def _reached_parts(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
         )  # fmt: skip
 
 
-Reading = Callable[[Mapping[str, Any], FloatArray], FloatArray]
+Reading = Callable[[Inputs, FloatArray], FloatArray]
 # How coordinates may be meant.
 READINGS: Sequence[tuple[Sentence, Reading]] = (
     (sentence("degrees"), lambda robot, q: np.where(robot["slides"], q, np.radians(q))),
@@ -119,90 +175,6 @@ def _readings(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
                 "Taken as {reading}, your coordinates bring the tool to {hits} of {count} "
                 "targets; as they are, to {others}.",
                 reading=words, hits=hits, count=count, others=others,
-            )  # fmt: skip
-
-
-SIDES = (
-    sentence("{count} answers leave upper limits, and none leaves lower limits."),
-    sentence("{count} answers leave lower limits, and none leaves upper limits."),
-)  # fmt: skip
-
-
-def _limits(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield which limits are left, if those of one side, or of one joint, are kept by all."""
-    sides = [
-        np.array([motion.inputs["lower"] - motion.q, motion.q - motion.inputs["upper"]]) > AT_LIMIT
-        for motion in motions
-    ]
-    counts = [sum(int(side[k].any(axis=-1).sum()) for side in sides) for k in range(2)]
-    if max(counts) < MIN_COUNT:
-        return
-    if not min(counts):
-        yield Sentence(SIDES[int(np.argmin(counts))].template, {"count": max(counts)})
-    left = [np.flatnonzero((side[0] | side[1]).any(axis=0)) for side in sides]
-    for role, words in ((0, sentence("the first joint")), (-1, sentence("the last joint"))):
-        joints = [role % motion.q.shape[1] for motion in motions]
-        if all(set(js) <= {j} for js, j in zip(left, joints, strict=True)):
-            yield sentence("Of all joints only {joint} leaves its limits.", joint=words)
-
-
-ROLES: Sequence[tuple[Sentence, Callable[[Mapping[str, Any]], BoolArray]]] = (
-    (sentence("The first joint"), lambda robot: np.arange(len(robot["axes"])) == 0),
-    (sentence("The last joint"),
-     lambda robot: np.arange(len(robot["axes"])) == len(robot["axes"]) - 1),
-    (sentence("A slide"), lambda robot: robot["slides"]),
-)  # fmt: skip
-
-
-def _still_joints(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield which joints never move though they move the tool, and others do."""
-    for words, has_role in ROLES:
-        count, is_still = 0, True
-        for motion in motions:
-            moves = np.asarray((np.abs(motion.changes) > EXACT).any(axis=0))
-            joints = has_role(motion.inputs) & (ancestors(motion.inputs) > 0.0)
-            if moves[~joints].any() and joints.any():
-                count += 1
-                is_still &= not moves[joints].any()
-        if count >= MIN_COUNT and is_still:
-            yield sentence("{joint} never moves in {count} answers, though it moves the tool.",
-                           joint=words, count=count)  # fmt: skip
-
-
-def _claims(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield that success, or failure, is reported of all answers."""
-    claimed = [m for m in motions if m.is_claimed is not None and m.case.family not in FEW_STEPS]
-    for claim, words in (
-        (True, sentence("Success is reported in all {count} answers, of which {others} are off "
-                        "their targets.")),
-        (False, sentence("Failure is reported in all {count} answers, of which {others} are on "
-                         "their targets.")),
-    ):  # fmt: skip
-        others = [m for m in claimed if bool(m.is_off_target[0]) is claim]
-        if others and len(claimed) >= MIN_COUNT and all(m.is_claimed is claim for m in claimed):
-            yield Sentence(words.template, {"count": len(claimed), "others": len(others)})
-
-
-FEW_STEPS = (robot_targets.STEP, robot_targets.LIMIT_STEP, robot_targets.FEW)
-
-
-def _accepted_starts(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield the largest errors of starts, in tolerances, that are taken for targets."""
-    starts = [motion for motion in motions if motion.case.family == robot_targets.TOLERANCE]
-    for part, words in enumerate((sentence("position"), sentence("rotation"))):
-        ratios = []
-        for motion in starts:
-            errors = np.linalg.norm(motion.twists(motion.previous)[0].reshape(2, 3), axis=1)
-            ratio = errors / [motion.inputs["tolerance"], motion.inputs["tolerance_rotation"]]
-            if ratio[part] > ratio[1 - part]:
-                is_accepted = np.abs(motion.changes).max() <= EXACT
-                ratios.append((float(ratio[part]), bool(is_accepted)))
-        accepted = [ratio for ratio, is_accepted in ratios if is_accepted and ratio > 1.0]
-        if accepted and max(ratio for ratio, _ in ratios) > 1.0:
-            yield sentence(
-                "Starts are taken for targets though their {part} is off by up to {ratio:.3g} "
-                "tolerances ({hits} of {count}).",
-                part=words, ratio=max(accepted), hits=len(accepted), count=len(ratios),
             )  # fmt: skip
 
 
@@ -238,50 +210,30 @@ _VELOCITY = sentence("the tool's velocity")
 
 def _single_iterations(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield what single iterations make of errors, of robots that can move freely."""
-    steps = [m for m in motions if m.inputs["max_iterations"] == 1 and m.q.shape[1] >= MIN_COUNT]
-    moves, errors, frames = list[FloatArray](), list[FloatArray](), list[FloatArray]()
-    cosines = list[float]()
-    for motion in steps:
-        is_free = ~motion.at_limits.any(axis=1) & (np.abs(motion.changes).max(axis=1) > EXACT)
-        if is_free.any():
-            J = motion.jacobians[is_free]
-            moves.append(np.einsum("fij,fj->fi", J, motion.changes[is_free]))
-            errors.append(motion.twists(motion.previous)[is_free])
-            tool = tool_pose(motion.inputs, motion.previous[is_free])
-            frames.append(rotation.to_matrix(tool.rotations))
-            gradients = np.einsum("fij,fi->fj", J, errors[-1])
-            cosines += _cosines(gradients, motion.changes[is_free])
-    if moves:
-        parts = np.concatenate(moves), np.concatenate(errors), np.concatenate(frames)
-        yield from _factors(*parts, _STEP)
-    if len(cosines) >= MIN_COUNT and min(cosines) > 1.0 - SAME_ENTRY:
-        yield sentence("Single iterations go along J' e, the gradient, in all {count} cases.",
-                       count=len(cosines))  # fmt: skip
+    rows = []
+    for motion in motions:
+        if motion.inputs["max_iterations"] == 1 and motion.q.shape[1] >= MIN_COUNT:
+            is_free = ~motion.at_limits.any(axis=1) & (np.abs(motion.changes).max(axis=1) > EXACT)
+            moves = np.einsum("fij,fj->fi", motion.jacobians, motion.changes)
+            errors = motion.twists(motion.previous)
+            frames = rotation.to_matrix(tool_pose(motion.inputs, motion.previous).rotations)
+            rows.append([part[is_free] for part in (moves, errors, frames)])
+    if rows:
+        yield from _factors(*map(np.concatenate, zip(*rows, strict=True)), _STEP)
 
 
-def _cosines(first: FloatArray, second: FloatArray) -> list[float]:
-    """Return the cosines of the angles between vectors, (row)."""
-    lengths = np.linalg.norm(first, axis=1) * np.linalg.norm(second, axis=1)
-    return list(((first * second).sum(axis=1) / np.maximum(lengths, 1e-300)).tolist())
-
-
-def _tool_velocities(
-    judgements: Sequence[CaseJudgement],
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the velocities of tools that can move freely, those asked for, and rotations."""
+def _tool_velocities(judgements: Sequence[CaseJudgement]) -> Iterator[Sentence]:
+    """Yield what tools that can move freely make of the velocity asked for."""
     rows = []
     for judgement in judgements:
         assert isinstance(judgement.answer, Answer)
         inputs, speeds = judgement.case.inputs, judgement.answer.values["velocities"]
-        J = jacobian(mechanism(inputs), inputs["q"], -1)
+        J, twist = robot_velocity.right_equation(inputs)
         if np.linalg.matrix_rank(J, robot_velocity.RANK) == 6 and np.isfinite(speeds).all():
-            twist = np.concatenate([inputs["linear_velocity"], inputs["angular_velocity"]])
             R = rotation.to_matrix(tool_pose(inputs, inputs["q"]).rotations)
             rows.append((J @ speeds, twist, R))
-    shapes = ((0, 6), (0, 6), (0, 3, 3))
-    columns = zip(*rows, strict=True) if rows else map(np.zeros, shapes)
-    moves, twists, frames = map(np.array, columns)
-    return moves, twists, frames
+    if rows:
+        yield from _factors(*map(np.array, zip(*rows, strict=True)), _VELOCITY)
 
 
 PARTS = (sentence("linear part"), sentence("angular part"))
@@ -320,65 +272,55 @@ def _factors(
 # ---- Jacobians
 
 
-# Groups of entries, by whether a part is angular, of a slide, of the joint that carries the tool
-# and of one at the base.
-GROUPS: Sequence[tuple[Sentence, Callable[..., BoolArray]]] = (
-    (sentence("the linear parts of hinges"), lambda part, slide, last, first: ~part & ~slide),
-    (sentence("the angular parts of hinges"), lambda part, slide, last, first: part & ~slide),
-    (sentence("the columns of slides"), lambda part, slide, last, first: slide),
-    (sentence("the last columns"), lambda part, slide, last, first: last),
-    (sentence("the first columns"), lambda part, slide, last, first: first),
-    (sentence("the columns of hinges"), lambda part, slide, last, first: ~slide),
-)  # fmt: skip
+def _factors_of_jacobians(
+    judgements: Sequence[CaseJudgement], tables: dict[str, ElementTable]
+) -> Iterator[Sentence]:
+    """Yield the factors by which all answers differ from a convention; add the table of columns.
 
-
-def _parts_of_jacobians(judgements: Sequence[CaseJudgement]) -> Iterator[Sentence]:
-    """Yield the factors, or else the only parts, by which all answers differ from a convention."""
-    best, share = list[Sentence](), 0.0
-    for name, convention in robot_jacobian.CONVENTIONS.items():
-        columns = [_columns(judgement, name, convention) for judgement in judgements]
-        answer, right, *flags = (np.concatenate(x) for x in zip(*columns, strict=True))
-        bound = SAME_ENTRY * np.abs(right).max()
-        is_right = np.abs(answer - right).max(axis=-1) <= bound
-        groups = [(words, has_parts(*np.array(flags, dtype=bool))) for words, has_parts in GROUPS]
+    The table is by the convention that most columns have.
+    """
+    smallest = np.inf
+    for name in robot_jacobian.CONVENTIONS:
+        table, columns = ElementTable("robot_column", sound_cases(judgements)), []
+        for judgement in judgements:
+            answer, right, features = _columns(judgement, name)
+            errors = np.abs(answer - right).max(axis=-1) / max(np.abs(right).max(), 1e-300)
+            table.add(judgement.case.name, errors, features)
+            columns.append((answer, right, features["angular"], features["slide"]))
+        if table.wrong_count < smallest:
+            smallest, tables["robot_column"] = table.wrong_count, table
+        answer, right, is_angular, is_slide = map(np.concatenate, zip(*columns, strict=True))
+        groups = [~is_angular & ~is_slide, is_angular & ~is_slide, is_slide]
         factors = [float((answer * right)[group].sum() / max((right[group] ** 2).sum(), 1e-300))
-                   for _, group in groups[:3]]  # fmt: skip
-        scale = np.sum([f * group for f, (_, group) in zip(factors, groups, strict=False)], axis=0)
-        if (np.abs(answer - scale[:, None] * right).max(axis=-1) <= bound).all():
+                   for group in groups]  # fmt: skip
+        scaled = np.select(groups, factors)[:, None] * right
+        if (np.abs(answer - scaled) <= SAME_ENTRY * np.abs(right).max()).all():
             yield sentence(
                 "Your numbers are the right ones times a factor: {linear:.6g} in the linear parts "
                 "of hinges, {angular:.6g} in their angular parts, {slide:.6g} in slides.",
                 linear=factors[0], angular=factors[1], slide=factors[2],
             )  # fmt: skip
             return
-        only = [words for words, group in groups if is_right[~group].all()]
-        if only and is_right.mean() > share:
-            words = sentence("Only {what} of your Jacobians are wrong: all else is right.",
-                             what=only[0])  # fmt: skip
-            best, share = [words], float(is_right.mean())
-    yield from best
 
 
 def _columns(
-    judgement: CaseJudgement, name: str, convention: robot_jacobian.Convention
-) -> Sequence[FloatArray]:
-    """Return the answer's and the right parts of columns, (part, 3), and flags of each."""
+    judgement: CaseJudgement, name: str
+) -> tuple[FloatArray, FloatArray, dict[str, BoolArray]]:
+    """Return the answer's and the right parts of columns, (part, 3), and their features."""
     assert isinstance(judgement.answer, Answer)
     inputs = judgement.case.inputs
     shift = 3 if "angular part first" in name else 0
-    answer = judgement.answer.values["jacobian"]
-    pair = answer, robot_jacobian.right_jacobian(inputs, convention)
-    parts = [np.roll(J, shift, axis=0).reshape(2, 3, -1).swapaxes(1, 2) for J in pair]
-    joints = np.arange(len(inputs["q"]))
-    flags = (inputs["slides"], joints == inputs["effector"], inputs["parents"] < 0)
-    return (
-        *(part.reshape(-1, 3) for part in parts),
-        np.repeat([0, 1], len(joints)),
-        *(np.tile(x, 2) for x in flags),
+    right = robot_jacobian.right_jacobian(inputs, robot_jacobian.CONVENTIONS[name])
+    answer, right = (
+        np.roll(J, shift, axis=0).reshape(2, 3, -1).swapaxes(1, 2).reshape(-1, 3)
+        for J in (judgement.answer.values["jacobian"], right)
     )
+    count = len(inputs["q"])
+    of_joints = _joint_features(inputs) | {"effector": np.arange(count) == inputs["effector"]}
+    features = {key: np.tile(column, 2) for key, column in of_joints.items()}
+    return answer, right, features | {"angular": np.repeat([False, True], count)}
 
 
 OBSERVATIONS: Sequence[Callable[[Sequence[Trajectory]], Iterator[Sentence]]] = (
-    _readings, _reached_parts, _limits, _still_joints, _single_iterations, _reported_velocities,
-    _claims, _accepted_starts,
+    _readings, _reached_parts, _single_iterations, _reported_velocities,
 )  # fmt: skip
