@@ -60,24 +60,14 @@ class CauseSearch:
             )
         return default
 
-    @contextmanager
-    def limited(self) -> Iterator[None]:
-        """Raise SearchLimit in the block after `SECONDS` of processor time, and after as many more.
+    def run_in_time(self, stage: Callable[[], T], default: T) -> T:
+        """Return the result of a stage, which may take `SECONDS` of processor time."""
 
-        Without timers of processor time (on Windows, and outside the main thread) a search ends
-        by the number of changes that it tries alone.
-        """
-        is_main = threading.current_thread() is threading.main_thread()
-        if not (is_main and hasattr(signal, "setitimer")):
-            yield
-            return
-        before = signal.signal(signal.SIGPROF, _expire)
-        signal.setitimer(signal.ITIMER_PROF, SECONDS, SECONDS)  # again, for what follows a stage
-        try:
-            yield
-        finally:
-            signal.setitimer(signal.ITIMER_PROF, 0.0)
-            signal.signal(signal.SIGPROF, before)
+        def run_limited() -> T:
+            with _limited():
+                return stage()
+
+        return self.run(run_limited, default)
 
 
 class NoSearch(CauseSearch):
@@ -106,3 +96,23 @@ class JudgedAnswers(NamedTuple):
 
 def _expire(*_: Any) -> None:
     raise SearchLimit
+
+
+@contextmanager
+def _limited() -> Iterator[None]:
+    """Raise SearchLimit in the block after `SECONDS` of processor time, and after as many more.
+
+    Without timers of processor time (on Windows, and outside the main thread) a search ends
+    by the number of changes that it tries alone.
+    """
+    is_main = threading.current_thread() is threading.main_thread()
+    if not (is_main and hasattr(signal, "setitimer")):
+        yield
+        return
+    before = signal.signal(signal.SIGPROF, _expire)
+    signal.setitimer(signal.ITIMER_PROF, SECONDS, SECONDS)  # again, for what follows a stage
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)

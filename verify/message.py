@@ -53,9 +53,9 @@ class Request(NamedTuple):
     inputs: Mapping[str, Any]
 
 
-def encode_greeting(number: int = 0) -> bytes:
+def encode_greeting() -> bytes:
     """Return the line that asks a solver for its greeting."""
-    return _line({"id": number, "task": GREETING, "protocol": PROTOCOL})
+    return _line({"id": 0, "task": GREETING, "protocol": PROTOCOL})
 
 
 def encode_case(number: int, case: Case) -> bytes:

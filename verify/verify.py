@@ -1,7 +1,7 @@
 """Ask a solver every case of its tasks, judge its answers, and explain wrong answers."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import msgspec
@@ -13,7 +13,7 @@ from .cause_search import SECONDS, CauseSearch, JudgedAnswers
 from .disciplines import DISCIPLINES
 from .exchange import Connection, Exchange, Failure, NoGreetingError, is_hung
 from .greeting import Greeting
-from .judgement import Diagnosis, Explanation, Report, TaskReport, Verdict
+from .judgement import Diagnosis, Report, TaskReport, Verdict
 from .kinematics import inverse_kinematics
 from .kinematics.claims import OF_WRONG_POSES
 from .laws import NO_NUMBERS
@@ -100,44 +100,40 @@ def _unfinished(count: int, total: int) -> Sentence:
     )
 
 
+@dataclass
 class Attempt:
     """A solver at a task: it is asked and judged, then its wrong answers are explained."""
 
-    def __init__(
-        self,
-        connection: Connection,
-        task: str,
-        method: str,
-        seed: int,
-        thorough: bool,
-        notify: Notify,
-    ) -> None:
-        self.task, self.connection, self._method = task, connection, method
-        self._seed, self._thorough, self._notify = seed, thorough, notify
-        self._answers: dict[str, Sequence[Exchange]] = {}  # by the greeting that the cases suit
-        self._unsent: Sentence | None = None
+    connection: Connection
+    task: str
+    method: str
+    seed: int
+    thorough: bool
+    notify: Notify
+    answers: dict[str, Sequence[Exchange]] = field(default_factory=dict)  # by the cases' greeting
+    unsent: Sentence | None = None  # that the last cases were not sent, if any
 
     def _ask(self, greeting: Greeting) -> Sequence[Exchange]:
         """Return the answers to the cases that suit a greeting, which are asked once."""
         key = repr(greeting)
-        if key not in self._answers:
-            cases = DISCIPLINES[self.task].cases(greeting, self._method, self._seed, self._thorough)
-            self._answers[key] = self.exchange(cases)
-        return self._answers[key]
+        if key not in self.answers:
+            cases = DISCIPLINES[self.task].cases(greeting, self.method, self.seed, self.thorough)
+            self.answers[key] = self.exchange(cases)
+        return self.answers[key]
 
     def exchange(self, cases: Sequence[Case]) -> Sequence[Exchange]:
         """Return the answers to some cases."""
-        exchanges = _ask(self.connection, cases, self._notify)
+        exchanges = _ask(self.connection, cases, self.notify)
         if unsent := len(cases) - len(exchanges):
-            self._unsent = _unsent(unsent, len(cases))
+            self.unsent = _unsent(unsent, len(cases))
         return exchanges
 
     def judge(self, greeting: Greeting, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
         """Judge the given answers by a greeting, or else answers to all suitable cases."""
         exchanges = self._ask(greeting) if exchanges is None else exchanges
-        self._notify(sentence("judging {task}", task=self.task), 0, None)
+        self.notify(sentence("judging {task}", task=self.task), 0, None)
         greeting, reason = precision.judging_greeting(exchanges, greeting)
-        report = DISCIPLINES[self.task].judge(exchanges, greeting, self._method)
+        report = DISCIPLINES[self.task].judge(exchanges, greeting, self.method)
         reasons = (reason,) if reason else ()
         report = replace(report, assumptions=reasons, exchanges=exchanges, greeting=greeting)
         return self._with_unsent(report)
@@ -151,13 +147,9 @@ class Attempt:
 
     def observe(self, verdict: TaskReport, search: CauseSearch) -> tuple[Sentence, ...]:
         """Return observations on wrong answers, or the reason for none; () for right answers."""
-
-        def observe_in_time() -> tuple[Sentence, ...]:
-            with search.limited():
-                return observations.observe(self.connection, verdict, self._seed)
-
         silence: tuple[Sentence, ...] = ()
-        observed = search.run(observe_in_time, silence)
+        observe = partial(observations.observe, self.connection, verdict, self.seed)
+        observed = search.run_in_time(observe, silence)
         is_failed = search.end is not None and not search.is_interrupted
         return (search.end,) if is_failed and search.end else observed
 
@@ -175,21 +167,18 @@ class Attempt:
             task=self.task,
             seconds=SECONDS,
         )
-        self._notify(work, 0, None)
-
-        def find_in_time() -> TaskReport:
-            with cause_search.limited():
-                return self._explained(verdict, reports, cause_search)
-
-        report = self._with_unsent(cause_search.run(find_in_time, verdict))
+        self.notify(work, 0, None)
+        find_cause = partial(self._explained, verdict, reports, cause_search)
+        report = self._with_unsent(cause_search.run_in_time(find_cause, verdict))
         if cause_search.end is None or report.verdict <= Verdict.RIGHT_EXCEPT:
             return report
-        return _with_hint(report, cause_search.end)
+        hints = (cause_search.end, *report.diagnosis.hints)
+        return replace(report, diagnosis=replace(report.diagnosis, hints=hints))
 
     def _explained(
         self, verdict: TaskReport, reports: Sequence[TaskReport], search: CauseSearch
     ) -> TaskReport:
-        causes = [report for report in reports if _builds_on(self.task, self._method, report)]
+        causes = [report for report in reports if _builds_on(self.task, self.method, report)]
         order = BUILDS_ON.get(self.task, ())
         causes.sort(key=lambda r: (not r.diagnosis.explained, order.index(r.task)))
         is_placed = not (causes and causes[0].diagnosis.explained)
@@ -214,16 +203,10 @@ class Attempt:
         return DISCIPLINES[self.task].diagnose(answers)
 
     def _with_unsent(self, report: TaskReport) -> TaskReport:
-        unsent, hints = self._unsent, report.diagnosis.hints
+        unsent, hints = self.unsent, report.diagnosis.hints
         if unsent is None or unsent in hints:
             return report
         return replace(report, diagnosis=replace(report.diagnosis, hints=(*hints, unsent)))
-
-
-def _with_hint(report: TaskReport, hint: Sentence) -> TaskReport:
-    """Return a report with a hint before the others."""
-    diagnosis = report.diagnosis
-    return replace(report, diagnosis=replace(diagnosis, hints=(hint, *diagnosis.hints)))
 
 
 def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnosis]) -> TaskReport:
@@ -236,23 +219,19 @@ def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnos
     return replace(report, diagnosis=replace(diagnosis, explanations=explanations))
 
 
-def _is_of_inputs(explanation: Explanation) -> bool:
-    """Return whether a mistake is no false claim, which is right where the restriction is meant."""
-    return not {code.split("-")[1] for code in explanation.codes} <= {"CLAIM"}
-
-
 def _unless_meant(report: TaskReport, original: TaskReport) -> TaskReport:
-    """Return a report by restricted requests with the explanations of answers to all requests."""
+    """Return a report by restricted requests with the explanations of answers to all requests.
+
+    A false claim is no such explanation where the restriction is meant.
+    """
     explanations = original.diagnosis.explanations
     if report.verdict <= Verdict.UNDECIDED:
-        explanations = tuple(map(_if_unmeant, filter(_is_of_inputs, explanations)))
+        explanations = tuple(
+            replace(e, sentence=sentence("If that is not meant: {what}", what=e.sentence))
+            for e in explanations
+            if not {code.split("-")[1] for code in e.codes} <= {"CLAIM"}
+        )
     return replace(report, diagnosis=replace(report.diagnosis, explanations=explanations))
-
-
-def _if_unmeant(explanation: Explanation) -> Explanation:
-    """Return the explanation of answers that are right if a restriction is meant."""
-    words = sentence("If that is not meant: {what}", what=explanation.sentence)
-    return replace(explanation, sentence=words)
 
 
 def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> TaskReport:

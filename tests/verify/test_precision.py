@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 from kinematics_solvers import faulty, textbook
 
-from plumbob.text.sentence import sentence
-from plumbob.verify.case import Case
-from plumbob.verify.exchange import Answer
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting
 from plumbob.verify.judgement import (
-    CaseJudgement,
-    Diagnosis,
     Report,
-    TaskReport,
     Verdict,
 )
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.screen import json_file, junit, page, terminal
 from plumbob.verify.screen.words import Presentation, speaker
-from plumbob.verify.take.precision import has_double
 from plumbob.verify.verify import DISCIPLINES, judge_cases, verify
 from tests.honest_solvers import DECLARED, Stepper
 
@@ -197,15 +190,6 @@ def test_declared_single_precision_is_right_without_a_word(task):
     assert not report.assumptions
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert judged(task, TASKS[task][0](None), printed("%g"), precision="single").assumptions
-
-
-@pytest.mark.parametrize(("digits", "is_double"), [
-    ([15.0, 14.0, 12.0, 1.0], True), ([15.0, 14.0, 1.0, None], False), ([7.0, 8.0, 6.0], False),
-])  # fmt: skip
-def test_several_answers_of_many_digits_are_in_double_precision(digits, is_double):
-    case = Case("one", "mass_spring_step", {}, "x", sentence("It is all."))
-    judgements = [CaseJudgement(case, Answer({}, 0.0), (), {}, count, 0.0) for count in digits]
-    assert has_double(TaskReport("mass_spring_step", "", judgements, Diagnosis())) is is_double
 
 
 @pytest.mark.usefixtures("verdict_alone")

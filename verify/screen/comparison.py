@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation, solve_ik
+from plumbob.reference import Skeleton, forward_kinematics, local_from_global, rotation
 from plumbob.reference.arguments import FloatArray, digits_apart
 
 from ..exchange import Answer
@@ -45,21 +45,6 @@ class CaseDrawing(NamedTuple):
     answer: Wireframe | None
     expected: Wireframe | None
     marks: FloatArray  # a target, or pins (point, 3)
-
-
-def _outputs(judgement: CaseJudgement) -> tuple[Outputs, Outputs]:
-    """Return the outputs of the solver and those of the reference, {} where there are none."""
-    case, answer, expected = judgement.case, judgement.answer, judgement.expected
-    if not expected and case.task == "inverse_kinematics":  # many answers are right
-        start, target = case.inputs["local_rotations"], case.inputs["target"]
-        skeleton = Skeleton(case.inputs["parents"], case.inputs["offsets"])
-        effector = int(case.inputs["effector"])
-        try:
-            solution = solve_ik(skeleton, start, target, solver="fabrik", effector=effector)
-            expected = {"local_rotations": solution.local_rotations}
-        except ValueError:
-            expected = {}
-    return answer.values if isinstance(answer, Answer) else {}, expected
 
 
 def _positions(inputs: Outputs, outputs: Outputs) -> FloatArray | None:
@@ -173,7 +158,8 @@ def texts(row: NumberRow) -> tuple[str, str]:
 def drawing_of(judgement: CaseJudgement) -> CaseDrawing | None:
     """Return the wireframes of a case, or None if there are none."""
     inputs, task = judgement.case.inputs, judgement.case.task
-    answer, expected = (_shape(task, inputs, outputs) for outputs in _outputs(judgement))
+    answered = judgement.answer.values if isinstance(judgement.answer, Answer) else {}
+    answer, expected = (_shape(task, inputs, x) for x in (answered, judgement.expected))
     if answer is None and expected is None:
         return None
     request, marks = None, np.empty((0, 3))

@@ -171,14 +171,12 @@ def _error_in(words: Sentence) -> float:
 def advice(tasks: Sequence[TaskReport]) -> Sentence:
     """Return the next step to take."""
     bad = [task for task in tasks if task.verdict not in GOOD]
-    if not bad and any(task.verdict is Verdict.RIGHT_EXCEPT for task in tasks):
+    if not bad:
         return sentence(
             "Next: correct what is said above, or leave it if it is meant. Then --junit FILE for "
             "your CI, plumbob.testing for your pytest, --thorough for more cases."
-        )
-    if not bad:
-        return sentence(
-            "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "
+            if any(task.verdict is Verdict.RIGHT_EXCEPT for task in tasks)
+            else "Next: --junit FILE for your CI, plumbob.testing for your pytest, --thorough for "
             "more cases."
         )
     if is_unwritten(bad[0]):

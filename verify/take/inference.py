@@ -102,15 +102,14 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     if report.verdict is Verdict.RIGHT or greeting.system.continues or is_stuck:
         return report
     is_sound = report.verdict is Verdict.RIGHT_EXCEPT
-    shown = [
-        (r, why)
-        for r in RESTRICTIONS
-        if not is_sound or r.measured
-        if (why := _evidence(connection, report, r))
-    ]
-    known = [(_with_constant(connection, report, restriction), why) for restriction, why in shown]
-    evidence = [(restriction, why) for restriction, why in known if restriction]
-    unknown = [r for (r, _), (measured, _) in zip(shown, known, strict=True) if measured is None]
+    evidence, unknown = list[tuple[Restriction, Sentence]](), list[Restriction]()
+    for restriction in RESTRICTIONS:
+        is_tried = restriction.measured or not is_sound
+        why = _evidence(connection, report, restriction) if is_tried else None
+        if why is not None and (known := _with_constant(connection, report, restriction)):
+            evidence.append((known, why))
+        elif why is not None:
+            unknown.append(restriction)
     if not evidence:
         return _with_unknown(report, unknown)
 
