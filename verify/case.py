@@ -8,8 +8,8 @@ import numpy as np
 
 from plumbob.text.sentence import Sentence
 
-# What a solver owes a case: a right answer; an answer or a failure, since textbooks divide by zero
-# there; or any of several answers that the laws allow, or a failure.
+# The answer that a case needs. "must" is a right answer, "may" an answer or a failure, since
+# textbooks divide by zero there; "implementation-defined" is any answer within the laws, or a failure.
 Requirement = Literal["must", "may", "implementation-defined"]
 
 
@@ -17,8 +17,8 @@ Requirement = Literal["must", "may", "implementation-defined"]
 class Case:
     """A request with a name.
 
-    The inputs are float64 and integer arrays, numbers and texts, by the names of the task's inputs,
-    without those that the greeting does not ask for.
+    The inputs are float64 and integer arrays, numbers and texts, by the names of the task's inputs.
+    Inputs beyond the declarations of the greeting are left out.
     """
 
     name: str  # unique among the cases of a task, the same in every run: "chain of 7 2"

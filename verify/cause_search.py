@@ -1,7 +1,7 @@
-"""The search for the cause of wrong answers: its limits, and why it ended early.
+"""The search for the cause of wrong answers: its limits, and why the search ended early.
 
-A verdict never depends on it: a stage that fails, takes too long or is interrupted costs the name
-of the mistake alone.
+A verdict never depends on this search: a failed, slow or interrupted stage costs the name of the
+mistake alone.
 """
 
 import signal
@@ -17,14 +17,14 @@ from .greeting import Greeting
 from .judgement import TaskReport
 
 T = TypeVar("T")
-# The processor time that the search for the cause of one task's answers may take [s]: wall time
-# would make the answer depend on what else the machine does.
+# The processor time of the search for the cause of a task's answers [s]. Wall time would make the
+# answer depend on other work of the machine.
 SECONDS = 20.0
 INTERRUPTED = sentence("The search for the cause was interrupted.")
 
 
 class SearchLimit(BaseException):
-    """A search has taken its time; no handler of a stage's own errors catches it."""
+    """A search has taken its time; no handler of a stage's own errors catches this."""
 
 
 class CauseSearch:
@@ -40,7 +40,7 @@ class CauseSearch:
         return self.end is None
 
     def run(self, stage: Callable[[], T], default: T) -> T:
-        """Return the result of a stage, or the default if it ends early or the search has ended."""
+        """Return the result of a stage, or the default if stage or search have ended early."""
         if not self.is_on:
             return default
         try:
@@ -103,7 +103,7 @@ def _limited() -> Iterator[None]:
     """Raise SearchLimit in the block after `SECONDS` of processor time, and after as many more.
 
     Without timers of processor time (on Windows, and outside the main thread) a search ends
-    by the number of changes that it tries alone.
+    by its number of changes alone.
     """
     is_main = threading.current_thread() is threading.main_thread()
     if not (is_main and hasattr(signal, "setitimer")):

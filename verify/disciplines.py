@@ -26,9 +26,9 @@ from .mass_spring.stepping import Stepping
 
 
 class Discipline(NamedTuple):
-    """How one task is tried."""
+    """Cases, laws and diagnosis of a task."""
 
-    # returns cases that suit a solver by greeting, method and seed, more if thorough; from trivial
+    # returns suitable cases by greeting, method and seed, more if thorough; from trivial
     # to hostile, the smallest first
     cases: Callable[[Greeting, str, int, bool], list[Case]]
     # judges answers by laws, the reference, the declaration and honest programs
@@ -38,7 +38,7 @@ class Discipline(NamedTuple):
 
 
 def _by_laws(judged_answers: JudgedAnswers) -> Diagnosis:
-    """Return what laws say of answers that changed lines of right programs alone explain."""
+    """Return the diagnosis by laws alone; changed lines of right programs may explain answers."""
     return replace(judged_answers.report.diagnosis, explanations=())
 
 

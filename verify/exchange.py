@@ -68,17 +68,17 @@ class Connection(Protocol):
 
     @property
     def greeting(self) -> Greeting:
-        """Its declaration; raise NoGreetingError if it sends none."""
+        """Its declaration; raise NoGreetingError without a greeting."""
 
     @property
     def remarks(self) -> tuple[Sentence, ...]:
-        """Oddities apart from its answers; complete when it is closed."""
+        """Oddities apart from its answers; complete after `close`."""
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Ask it; start it again if it was lost."""
+        """Send a request; start a lost program again."""
 
     def close(self) -> None:
-        """End it with its child processes; the next case starts it again."""
+        """End the solver with its child processes; the next case starts both again."""
 
 
 # A function for each task; its arguments are the task's inputs.

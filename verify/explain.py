@@ -1,7 +1,7 @@
-"""Find the variants of the reference that reproduce a solver's answers.
+"""Find the variants of the reference with a solver's answers.
 
-The variants with the fewest faults come first, so that a combination is named only where no part
-of it suffices.
+The variants with the fewest faults come first, so a combination is named only where no part
+suffices.
 """
 
 import math
@@ -18,10 +18,10 @@ from .exchange import Answer, Exchange
 from .gaps import difference
 from .judgement import LEAST_SHARE, Explanation
 
-# A variant is compared with all answers only if it reproduces one of the first, most telling ones.
+# A variant without the first, most telling answers is not compared with all.
 TRIAL = 4
-# A combination of faults that leaves answers unexplained reproduces at least this share, and so
-# much more than any of its parts: else chance may explain it.
+# A combination of faults with unexplained answers reproduces at least this share, and so much
+# more than any of its parts. Else chance may explain the match.
 MOST_ANSWERS, MORE = 0.7, 0.2
 # The number of explanations to report.
 EXPLANATIONS = 3
@@ -31,8 +31,8 @@ class Variant(NamedTuple):
     """The reference with some faults."""
 
     faults: tuple[str, ...]  # their keys, in the order of the computation; () for an honest model
-    # returns the outputs for a case by name, of which those also answered are compared; an
-    # exception of NumPy or a ValueError means that the variant has no answer
+    # returns the outputs for a case by name; answered outputs are compared. An exception of
+    # NumPy or a ValueError stands for no answer
     predict: Callable[[Case], Mapping[str, Any]]
     is_special: bool = False  # compared only if no plain one with as few faults explains all
     amplification: float = 1.0  # by which its faults enlarge rounding
@@ -54,12 +54,12 @@ def explain(
     describe: Callable[[Sequence[str]], Sentence],
     trial: int = TRIAL,
 ) -> tuple[Explanation, ...]:
-    """Return the variants that reproduce most answers, nearest first.
+    """Return the variants with most answers, nearest first.
 
     The variants come in ascending order of the number of faults, special variants last; the most
-    telling answers come first: small, and wrong. `tolerance` is the relative difference that
-    rounding explains; `describe` puts the faults into words, given the keys of a class that no
-    answer tells apart. A variant has to reproduce one of the first `trial` answers.
+    telling answers come first: small, and wrong. `tolerance` is the relative difference by
+    rounding; `describe` puts faults into words, given the keys of a class without a difference in
+    any answer. A variant has to reproduce an answer among the first `trial` answers.
     """
     answers = [exchange for exchange in exchanges if isinstance(exchange.answer, Answer)]
     matches = list[Match]()
@@ -77,9 +77,9 @@ def explain(
 
 
 def _telling(matches: Sequence[Match]) -> list[Match]:
-    """Return the perfect or else the faulty matches that explain more than any of their parts.
+    """Return the perfect or else the faulty matches with a larger share than any of their parts.
 
-    A combination that leaves answers unexplained has to explain many, and many more than its parts.
+    A combination with unexplained answers has to explain many, and many more than its parts.
     """
 
     def is_needless(match: Match) -> bool:
@@ -97,7 +97,7 @@ def _telling(matches: Sequence[Match]) -> list[Match]:
 def _match(
     variant: Variant, answers: Sequence[Exchange], tolerance: float, trial: int
 ) -> Match | None:
-    """Return how well a variant reproduces answers, None if it reproduces no early answer."""
+    """Return how well a variant reproduces answers, or None without an early answer."""
     distances, predictions = list[float](), list[Mapping[str, Any]]()
     for i, exchange in enumerate(answers):
         if i == trial and not distances:
@@ -123,16 +123,17 @@ def _predict(variant: Variant, case: Case) -> Mapping[str, Any]:
 
 
 def _classes(matches: Sequence[Match], tolerance: float) -> list[list[Match]]:
-    """Return matches grouped with matches of the same faults, or that no answer tells apart.
+    """Return matches in groups: of the same faults, or with as many faults and the same answers.
 
-    The latter have as many faults; the former are of programs that make other choices beside them.
+    Programs with the same faults may differ in other choices.
     """
 
     def is_alike(first: Match, second: Match) -> bool:
-        faults, others = first.variant.faults, second.variant.faults
+        faults, second_faults = first.variant.faults, second.variant.faults
         pairs = zip(first.predictions, second.predictions, strict=True)
-        return faults == others or (
-            len(faults) == len(others) and all(difference(*pair) <= tolerance for pair in pairs)
+        return faults == second_faults or (
+            len(faults) == len(second_faults)
+            and all(difference(*pair) <= tolerance for pair in pairs)
         )
 
     classes: list[list[Match]] = []
@@ -152,9 +153,9 @@ def ending_test(
 ) -> Sentence | None:
     """Return the test by which iterations end too early, None if no test does.
 
-    Its quantity has a number for each iterate, those at early ends smaller than any before an end,
-    and smaller than the constant of a test that has one. The first test is of the number of
-    iterations, which a single run does not show; of the others round bounds are likelier.
+    Its quantity has a number for each iterate. Numbers at early ends are smaller than all numbers
+    before an end, and smaller than the constant of the test, if any. The first test is of the
+    number of iterations, which no single run shows; round bounds of other tests are likelier.
     """
     candidates = list[tuple[bool, Sentence]]()
     for quantity, constant, words in tests:
@@ -162,10 +163,10 @@ def ending_test(
             values = [quantity(run) for run in runs]
         last = [v[-1] for v, early in zip(values, is_early, strict=True) if early]
         before = np.concatenate([v[:-1] for v in values])
-        largest, least = float(max(last)), float(min(before, default=np.inf))
-        if constant is not None and not largest < constant <= least:
+        largest, smallest_before = float(max(last)), float(min(before, default=np.inf))
+        if constant is not None and not largest < constant <= smallest_before:
             continue
-        bound = separating_bound(largest, least)
+        bound = separating_bound(largest, smallest_before)
         is_count = quantity is tests[0][0]
         if bound is not None and (len(last) > 1 or not is_count):
             count = -round(max(last))
@@ -184,7 +185,7 @@ def is_round(number: float) -> bool:
 def separating_bound(last: float, before: float) -> float | None:
     """Return a round number above `last` and not above `before`, None if there is none.
 
-    It is 1, 2 or 5 times a power of ten if possible, else their geometric mean.
+    The number is 1, 2 or 5 times a power of ten if possible, else their geometric mean.
     """
     if not last < before < np.inf:
         return None
@@ -196,7 +197,7 @@ def separating_bound(last: float, before: float) -> float | None:
 
 
 def together(mistakes: Sequence[Sentence]) -> Sentence:
-    """Return the sentences of one mistake, or of two simultaneous mistakes, as one sentence."""
+    """Return the sentences of a mistake, or of two simultaneous mistakes, as a single sentence."""
     if len(mistakes) == 1:
         return mistakes[0]
     return sentence(

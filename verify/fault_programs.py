@@ -1,8 +1,8 @@
-"""The known faults by code, each with a short wrong program and the right one.
+"""The known faults by code, each with a short wrong and a right program.
 
 `programs.toml` lists the right programs. The entry of a fault in a `faults.toml` has pairs of a
-right and a wrong text, `lines`: the right program with the first replaced by the second is the
-wrong one.
+right and a wrong text, `lines`. The wrong texts in place of the right texts make the wrong
+program.
 """
 
 import ast
@@ -21,13 +21,13 @@ from .functions import FunctionConnection
 from .message import decode_greeting
 
 FOLDER = Path(__file__).parent
-# The files with faults, those of kinematics first.
+# The files with faults, kinematics first.
 FILES = sorted(FOLDER.rglob("faults.toml"))
 _TABLE = tomllib.loads((FOLDER / "programs.toml").read_text(encoding="utf-8"))
 
 
 def _in_forms(name: str, entry: Mapping[str, Any]) -> Iterator[tuple[str, Mapping[str, Any]]]:
-    """Yield the program of an entry, or that of each of its forms: a text for each of its texts."""
+    """Yield the program of an entry, or a program for each of its forms."""
     forms = entry.get("forms", {})
     for number, texts in enumerate(zip(*forms.values(), strict=True) if forms else [()], 1):
         replaced = (*entry.get("replaced", ()), *zip(forms, texts, strict=True))
@@ -61,9 +61,9 @@ def changes_of(program: str) -> Iterator[TextChange]:
             wrong = source
             for right, text in table["lines"]:
                 wrong = wrong.replace(right, _filled(text, table["texts"], texts))
-            shown = _filled(table["shown"][1], table["texts"], texts)
+            wrong_text = _filled(table["shown"][1], table["texts"], texts)
             right = table["shown"][0]
-            yield TextChange(table["kind"], wrong, table["function"], right, shown)
+            yield TextChange(table["kind"], wrong, table["function"], right, wrong_text)
 
 
 def _filled(text: str, names: Iterable[str], texts: Sequence[str]) -> str:
@@ -74,7 +74,7 @@ def _filled(text: str, names: Iterable[str], texts: Sequence[str]) -> str:
 
 
 class CodedFault(NamedTuple):
-    """A known fault, and how the right program becomes one that has it."""
+    """A known fault, and the change of the right program to a wrong program."""
 
     code: str
     name: str  # its key in the catalogue
@@ -89,7 +89,7 @@ class CodedFault(NamedTuple):
 
     @property
     def task(self) -> str:
-        """The task that its programs solve."""
+        """The task of its programs."""
         return str(PROGRAMS[self.program]["task"])
 
     @property
@@ -103,7 +103,7 @@ class CodedFault(NamedTuple):
         return self.planted_in(self.right_program)
 
     def planted_in(self, program: str) -> str:
-        """Return a right program with the fault; raise ValueError if it has not each line once.
+        """Return a right program with the fault; raise ValueError unless each line is there once.
 
         A replaced line may stand deeper than in the fault's own program: its replacement is
         indented likewise.
@@ -122,7 +122,7 @@ class CodedFault(NamedTuple):
 
 
 def _indentation(program: str, text: str) -> int:
-    """Return the number of spaces before the line that a text begins in."""
+    """Return the number of spaces before the first line of a text."""
     line = program[: program.index(text)].rpartition("\n")[2] + text
     return len(line) - len(line.lstrip(" "))
 
@@ -130,10 +130,10 @@ def _indentation(program: str, text: str) -> int:
 def _replaced(program: str, right: str, wrong: str, margin: str) -> str:
     """Return a program with a replaced text; the lines of the new text get a further margin."""
     before, after = program.split(right)
-    first, *others = wrong.splitlines(keepends=True) or [""]
+    first, *remaining_lines = wrong.splitlines(keepends=True) or [""]
     if right.startswith(" "):  # whole lines, whose margin stands before them
         before, first = before.removesuffix(margin), first and margin + first
-    return before + first + "".join(margin + line for line in others) + after
+    return before + first + "".join(margin + line for line in remaining_lines) + after
 
 
 @cache
@@ -152,7 +152,7 @@ def _collect(
     imports: dict[str, None],
     bodies: dict[str, str],
 ) -> None:
-    """Add the imports and the body of a module, after those of the parts that it imports."""
+    """Add the imports and the body of a module, after the imports and bodies of its parts."""
     path = FOLDER / "programs" / f"{module.replace('.', '/')}.py"
     text = path.read_text(encoding="utf-8")
     for old, new in replaced:

@@ -1,4 +1,4 @@
-"""Functions of Python as a connection, and the values that they may return."""
+"""Functions of Python as a connection, and their returned values."""
 
 import contextlib
 import inspect
@@ -18,8 +18,8 @@ from .exchange import Answer, Failure, FailureKind, Functions
 from .greeting import Greeting
 from .task import TASKS, Field, Task
 
-# The limit of points where a request leaves their number open: no case needs a tenth of them, and
-# the judge looks at each.
+# The limit of points where a request leaves their number open: no case needs a tenth, and the judge
+# looks at each point.
 MOST_POINTS = 1000
 _TYPES: Mapping[str, type] = {"number": np.float64, "integer": np.int64, "boolean": np.bool_}
 
@@ -34,7 +34,7 @@ class FunctionConnection:
         self.greeting = greeting
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Call the function of the case's method if there is one, else that of its task."""
+        """Call the function of the case's method if any, else the function of its task."""
         method = self._functions.get(case.inputs.get("method", ""))
         return call(method or self._functions[case.task], TASKS[case.task], case.inputs)
 
@@ -72,7 +72,7 @@ def call(function: Callable[..., Any], task: Task, inputs: Mapping[str, Any]) ->
 
 
 def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
-    """Return the parameters of a function, None of compiled code that does not list them."""
+    """Return the parameters of a function, None of compiled code without a signature."""
     try:
         return list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):
@@ -80,7 +80,7 @@ def _parameters(function: Callable[..., Any]) -> list[inspect.Parameter] | None:
 
 
 def takes(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function takes an argument, True if it does not list its parameters."""
+    """Return whether a function takes an argument, True of compiled code without a signature."""
     return _is_taken(name, _parameters(function))
 
 
@@ -94,7 +94,7 @@ def _is_taken(name: str, parameters: Sequence[inspect.Parameter] | None) -> bool
 def _missing_input(
     parameters: Sequence[inspect.Parameter], task: Task, inputs: Mapping[str, Any]
 ) -> str:
-    """Return an error if a function needs an argument that the inputs lack, else ""."""
+    """Return an error if the inputs lack an argument of a function, else ""."""
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
     missing = [
         parameter.name
@@ -113,7 +113,7 @@ def _missing_input(
 
 
 def describe_exception(error: BaseException, file: str) -> Failure:
-    """Return the failure of code that raised, with the last line in the folder of its file."""
+    """Return the failure of an exception, with the last line in the folder of the code's file."""
     reason = " ".join(str(error).split())[:200]
     kind = type(error).__name__
     if isinstance(error, SyntaxError) and error.filename:
@@ -131,7 +131,7 @@ def is_beside(path: Path, file: Path) -> bool:
 
 
 def raised(kind: str, why: str, file: str = "", line: int = 0) -> Failure:
-    """Return the failure of code that raised an exception, in a line of a file if it is known."""
+    """Return the failure of an exception, with its file and line if known."""
     message = sentence(
         "It raised {kind} in line {line} of {file}: {why}"
         if file and line
@@ -145,8 +145,8 @@ def understand(task: Task, inputs: Mapping[str, Any], returned: object) -> dict[
     """Return the outputs by name.
 
     The keys of a dict name outputs; other keys are ignored. The parts of a tuple go, in order, to
-    the next output of their shape. Any other value is a tuple of one part. Extents that the request
-    leaves open may be up to `MOST_POINTS`.
+    the next output of their shape. Any other value is a tuple of a single part. Open extents of
+    the request may be up to `MOST_POINTS`.
 
     Raises:
         ValueError: if there is no output, an output has another shape or is no number, or
@@ -187,7 +187,7 @@ def _by_shape(task: Task, counts: Mapping[str, int], parts: list[object]) -> dic
 
 
 def checked(field: Field, counts: Mapping[str, int], value: object) -> Any:
-    """Return a value as an array, number or text, null as NaN; raise ValueError if it misfits."""
+    """Return a value as an array, number or text, null as NaN; raise ValueError of a misfit."""
     if field.kind == "text":
         if isinstance(value, str):
             return value
@@ -231,7 +231,7 @@ def _holds_text(value: object) -> bool:
 
 
 def _whole(array: Any) -> bool:
-    """Return whether all are integers that 64 bits hold."""
+    """Return whether all numbers are integers of at most 64 bits."""
     if array.dtype.kind in "biu":
         return array.dtype != np.uint64 or not (array > np.iinfo(np.int64).max).any()
     return bool(((np.abs(array) < 2.0**62) & (np.floor(array) == array)).all())

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 PROTOCOL = 1
 
-# The most that a greeting may hold, each with its reason; the JSON Schema says so too.
+# The limits of a greeting, each with its reason, also in the JSON Schema.
 Name = Annotated[str, Meta(max_length=100, description="the verdict shows it in one line")]
 MethodName = Annotated[str, Meta(max_length=40, description="it heads rows of tables")]
 Methods = Annotated[
@@ -38,7 +38,7 @@ Method = Literal["explicit", "symplectic", "linearised", "local_global", "newton
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The time step that a solver declares to make.
+    """The declared time step of a solver.
 
     Attributes:
         method: explicit or symplectic Euler, one linearised implicit step, local/global or Newton
@@ -97,7 +97,7 @@ class System(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Fixed(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """Inputs that are constants of a solver; requests hold the same numbers.
+    """Constants of a solver in place of inputs; requests hold the same numbers.
 
     Attributes:
         max_iterations: the iterations of a solve that does not end earlier.

@@ -12,7 +12,7 @@ from .case import Case
 from .exchange import Answer, Exchange, Failure
 from .greeting import Greeting
 
-# The least share of the answers that a likely fault reproduces.
+# The least share of the answers by a likely fault.
 LEAST_SHARE = 0.5
 
 
@@ -52,14 +52,14 @@ class CaseJudgement:
 
     @property
     def verdict(self) -> Verdict:
-        """The worst of the findings; a failure has none unless the case allows it."""
+        """The worst of the findings; a failure has none unless the case allows failures."""
         if isinstance(self.answer, Failure) and not self.findings:
             return Verdict.BROKEN
         return max((finding.verdict for finding in self.findings), default=Verdict.UNDECIDED)
 
     @property
     def complaints(self) -> list[Sentence]:
-        """The sentences about a failure, or about laws that are not kept, the worst first."""
+        """The sentences about a failure, or about broken laws, the worst first."""
         if isinstance(self.answer, Failure) and not self.findings:
             return [self.answer.sentence]
         broken = [finding for finding in self.findings if finding.verdict is not Verdict.RIGHT]
@@ -70,10 +70,10 @@ class CaseJudgement:
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A fault, or several at once, that reproduces wrong answers.
+    """A fault, or several at once, with its share of the wrong answers.
 
-    An entry of `faults` is one key, or several joined by " + " in the order of the computation;
-    there are several entries if no answer tells them apart.
+    An entry of `faults` is a key, or several keys joined by " + " in the order of the computation;
+    several entries have the same answers.
     """
 
     faults: tuple[str, ...]
@@ -83,7 +83,7 @@ class Explanation:
 
     @property
     def codes(self) -> tuple[str, ...]:
-        """The codes of the faults that the sentence names, in its order."""
+        """The codes in the sentence, in its order."""
         return codes_in(self.sentence)
 
 
@@ -101,7 +101,7 @@ class Diagnosis:
 
     @property
     def share(self) -> float:
-        """The share of the answers that the best explanation reproduces."""
+        """The share of the answers by the best explanation."""
         return max((explanation.share for explanation in self.explanations), default=0.0)
 
     @property
@@ -131,13 +131,13 @@ def smallest_failures(judgements: Sequence[CaseJudgement], explained: bool) -> l
 
 @dataclass(frozen=True, eq=False)
 class TaskReport:
-    """The judgements of a task, or of one method of inverse kinematics."""
+    """The judgements of a task, or of a method of inverse kinematics."""
 
     task: str
     method: str  # of inverse kinematics and tracking, else ""
     judgements: Sequence[CaseJudgement]
     diagnosis: Diagnosis
-    # what it is judged by instead of the greeting: another precision, chains only, one mass
+    # the standard beside the greeting: another precision, chains only, a single mass
     assumptions: tuple[Sentence, ...] = ()
     needs_declaration: bool = False  # whether something assumed is a mistake unless it is declared
     exchanges: Sequence[Exchange] = ()
@@ -163,13 +163,13 @@ class TaskReport:
 
     @property
     def digits(self) -> float | None:
-        """Correct digits in the worst case where they can be counted."""
+        """Correct digits in the worst case, of cases with a count."""
         digits = [judgement.digits for judgement in self.judgements]
         return min((count for count in digits if count is not None), default=None)
 
     @cached_property
     def _times(self) -> list[tuple[Answer, float]]:
-        """The answers to cases that the reference is timed at, and its times [s]."""
+        """The answers to cases with times of the reference, and its times [s]."""
         return [
             (judgement.answer, judgement.reference_seconds)
             for judgement in self.judgements
@@ -178,7 +178,7 @@ class TaskReport:
 
     @property
     def untimed(self) -> Sentence | None:
-        """Why its time cannot be compared with the reference's, None if it can or is unknown."""
+        """Why its time cannot be compared with the reference's, or None."""
         reasons = [answer.untimed for answer, _ in self._times if answer.untimed]
         if self._times and not reasons and not any(answer.seconds for answer, _ in self._times):
             return sentence('Not timed: "seconds" is 0 in all answers. Use a finer clock.')
@@ -210,7 +210,7 @@ class Report:
 
 
 def first_broken(judgements: Sequence[CaseJudgement], law: str = "") -> Sentence | None:
-    """Return a sentence about the first broken law, or the given one, along the computation."""
+    """Return a sentence about the first broken law, or a given law, along the computation."""
     for judgement in judgements:
         for finding in judgement.findings:
             if finding.verdict >= Verdict.WRONG and law in ("", finding.law):

@@ -1,4 +1,4 @@
-"""Findings by the laws in `laws.toml`, and the judgement of a case from them."""
+"""Findings by the laws in `laws.toml`, and the judgement of a case by its findings."""
 
 import tomllib
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -16,13 +16,13 @@ from .gaps import largest_gap
 from .judgement import CaseJudgement, Finding, Verdict
 from .timing import time_call
 
-# Numbers that differ by less than this share are alike, in single precision too.
+# Numbers within this share of each other are alike, in single precision too.
 ROUNDED = 1e-5
-# Numbers of fewer decimals than these are rounded; in single precision they have as many [m].
+# Numbers of fewer decimals than these are rounded; single precision has as many [m].
 MAX_DECIMALS = 6
 HOLDS = sentence("It holds.")
 LAWS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-# The hint that a known mistake makes needless, since numbers that are none come from it.
+# The hint to leave out beside a known mistake, where NaN and infinity come from.
 NO_NUMBERS = Sentence(LAWS["hints"]["numbers"]["sentence"], {})
 
 
@@ -38,7 +38,7 @@ def finding(
 ) -> Finding:
     """Return RIGHT if an error is within its tolerance, else the finding of `laws.toml`.
 
-    The key is a law, or a law and a reason after a comma; the sentence has the fields {error},
+    The key is a law, or a law and a reason after a comma. Fields of the sentence are {error},
     {index} of the worst joint, particle or point, and `values`. `verdict` and `law` replace the
     fields of the entry.
     """
@@ -64,7 +64,7 @@ def of_joints(
 
 
 def not_finite(key: str, outputs: FloatArray, tolerance: float = 0.0) -> Finding:
-    """Return the finding that outputs of a joint are NaN or infinite."""
+    """Return the finding of outputs of a joint as NaN or infinite."""
     return finding(key, tolerance=tolerance, index=int(np.argmin(np.isfinite(outputs))))
 
 
@@ -85,8 +85,8 @@ def judge_case(
 ) -> CaseJudgement:
     """Return the judgement of an answer by the laws of its task and of all tasks.
 
-    `laws` returns the findings about its outputs, `reference` is the call to time, and two answers
-    to a request may differ by `allowed`, in any output or by its name.
+    `laws` returns the findings about its outputs; `reference` is the call to time. Two answers to
+    a request may differ by `allowed`, in any output or by its name.
     """
     answer, findings = exchange.answer, list[Finding]()
     seconds = time_call(reference)[1] if reference else None
@@ -120,7 +120,7 @@ def equal_answers(exchange: Exchange, allowed: float | Mapping[str, float]) -> F
 def hints_of(
     judgements: Sequence[CaseJudgement], is_explained: bool = False
 ) -> tuple[Sentence, ...]:
-    """Return hints at mistakes that no variant has, from the laws that are broken."""
+    """Return hints at mistakes without a program, from the broken laws."""
     findings = chain.from_iterable(judgement.findings for judgement in judgements)
     broken = {entry.law for entry in findings if entry.verdict >= Verdict.WRONG}
     hints = (
@@ -207,7 +207,7 @@ def _axes(pairs: Pairs) -> str:
 
 
 def _decimals(pairs: Pairs) -> int | None:
-    """Return the number of decimals of the first arrays if they are the second arrays rounded."""
+    """Return the number of decimals of the first arrays if these are the second arrays rounded."""
     a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
     for decimals in range(MAX_DECIMALS):
         is_round = np.abs(a - np.round(a, decimals)).max() <= 1e-3 * 0.1**decimals
@@ -217,7 +217,7 @@ def _decimals(pairs: Pairs) -> int | None:
 
 
 def _common_factor(pairs: Pairs) -> float | None:
-    """Return the number that makes the first arrays of the second, None if there is none."""
+    """Return the common factor from the second arrays to the first, or None."""
     a, b = (np.concatenate([pair[i].ravel() for pair in pairs]) for i in range(2))
     square = float(b @ b)
     factor = float(a @ b) / square if square > 0.0 else 0.0
@@ -226,7 +226,7 @@ def _common_factor(pairs: Pairs) -> float | None:
 
 
 def laws_that_hold(judgements: Sequence[CaseJudgement]) -> Sentence:
-    """Return the laws that no answer breaks."""
+    """Return the laws without a violation."""
     verdicts: dict[str, Verdict] = {}
     for entry in chain.from_iterable(judgement.findings for judgement in judgements):
         verdicts[entry.law] = max(entry.verdict, verdicts.get(entry.law, Verdict.RIGHT))

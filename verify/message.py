@@ -1,11 +1,11 @@
 """Requests and answers as lines of JSON, and greetings whose errors name their correction.
 
-Numbers are written with the shortest digits that give the same number back. null in an answer is
-NaN. Many writers print numbers that JSON does not know: NaN, nan, -nan, -nan(ind), Infinity and inf
-are read in an answer and never written in a request.
+Numbers are written with the shortest digits for the same double. null in an answer is NaN. Many
+writers print numbers beyond JSON. NaN, nan, -nan, -nan(ind), Infinity and inf are read in an
+answer and never written in a request.
 
-Besides the outputs of its task an answer may hold "seconds", the solver's own time; "printed", the
-beginning of its prints; "changed", the names of the inputs that it changed. An answer with an
+Besides outputs an answer may hold "seconds", the solver's own time, and "printed", the beginning of
+its prints. Its field "changed" has the names of changed inputs. An answer with an
 "error" may hold "kind": "raised" with the "exception", its "file" and its "line".
 """
 
@@ -30,15 +30,15 @@ from .task import TASKS, Task
 
 GREETING = "greeting"
 _OF_ANY_ANSWER = ("id", "seconds", "printed")
-# The resolution of the finest clock, and the tick of a coarse one [s].
+# The resolution of the finest clock, and the tick of a coarse clock [s].
 MIN_SECONDS, TICK = 1e-9, 0.02
 NO_SECONDS = sentence(
     "Not timed: only the round trips of requests are known, and these are mostly the time of the "
     'pipe. Send the time of your function alone as "seconds" (docs/protocol.md).'
 )
 _BOM = b"\xef\xbb\xbf"
-# Texts, which stay as they are, and words such as NaN. A text without an end matches as well:
-# looking for the end of each text within it would take quadratic time.
+# Texts, which stay, and words like NaN. A text without an end matches as well: looking for the end
+# of each inner text would take quadratic time.
 _WORDS = re.compile(
     r'"(?:[^"\\]|\\.)*+"?|([+-]?)\b(nan(?:\(\w*\))?|inf(?:inity)?)(?!\w)', re.IGNORECASE | re.DOTALL
 )
@@ -46,7 +46,7 @@ _TYPE_NAMES = {str: "a text", int: "an integer", float: "a number", bool: "a boo
 
 
 class Request(NamedTuple):
-    """A request as a solver reads it; the task is "greeting" in the first one."""
+    """A request as a solver reads the line; the first task is "greeting"."""
 
     id: int
     task: str
@@ -54,12 +54,12 @@ class Request(NamedTuple):
 
 
 def encode_greeting() -> bytes:
-    """Return the line that asks a solver for its greeting."""
+    """Return the request for a greeting as a line."""
     return _line({"id": 0, "task": GREETING, "protocol": PROTOCOL})
 
 
 def encode_case(number: int, case: Case) -> bytes:
-    """Return the line that asks a case, NaN as null; raise ValueError if a number is infinite."""
+    """Return the request of a case as a line, NaN as null; raise ValueError of infinite numbers."""
     inputs = {name: plain(value) for name, value in case.inputs.items() if value is not None}
     for name, value in case.inputs.items():
         if isinstance(value, float | np.ndarray) and np.isinf(value).any():
@@ -68,7 +68,7 @@ def encode_case(number: int, case: Case) -> bytes:
 
 
 def encode_answer(number: int, **fields: Any) -> bytes:
-    """Return the line that answers a request; infinite numbers are written as Infinity."""
+    """Return an answer as a line; infinite numbers are written as Infinity."""
     outputs = {name: plain(value) for name, value in fields.items()}
     return json.dumps({"id": number, **outputs}).encode() + b"\n"
 
@@ -100,7 +100,7 @@ def decode_object(line: bytes) -> dict[str, Any] | None:
 
 
 def _decode_leniently(text: bytes) -> dict[str, Any]:
-    """Decode JSON with words such as NaN, and numbers that no double holds."""
+    """Decode JSON with words like NaN, and numbers beyond doubles."""
     try:
         return json.loads(_WORDS.sub(_json_word, text.decode()))
     except UnicodeDecodeError as error:
@@ -115,7 +115,7 @@ def _decode_leniently(text: bytes) -> dict[str, Any]:
 
 
 def _json_word(match: re.Match[str]) -> str:
-    """Return JavaScript's word for a number that is not finite, which `json` reads."""
+    """Return JavaScript's word for NaN or infinity, as `json` reads."""
     sign, word = match.groups()
     if word is None:
         return match[0]
@@ -166,7 +166,7 @@ def decode_error(fields: Mapping[str, Any]) -> Failure:
 
 
 def _why_untimed(own: object, seconds: float) -> Sentence | None:
-    """Return why "seconds" of an answer cannot be the solver's own time, None if it can."""
+    """Return why "seconds" of an answer cannot be the solver's own time, or None."""
     if own is None:
         return NO_SECONDS
     if (
@@ -246,7 +246,7 @@ def _check_fields(fields: Mapping[str, Any], kind: type[msgspec.Struct], path: s
 
 
 def excerpt(value: object) -> str:
-    """Return a value as Python writes it; of a long text or list the beginning and the length."""
+    """Return a value in Python's form; of a long text or list the beginning and the length."""
     text = one_line(repr(value), 60)
     if not text.endswith("...") or not isinstance(value, str | list | tuple):
         return text
@@ -275,7 +275,7 @@ def _type_name(kind: Any) -> str:
 
 
 def one_of(name: str, value: object, options: Iterable[str]) -> str:
-    """Return a value that is an option; raise ValueError with the nearest option if it is none."""
+    """Return an option as given; raise ValueError of other values, with the nearest option."""
     options = list(options)
     if isinstance(value, str) and value in options:
         return value

@@ -22,11 +22,11 @@ def laws(
     thorough: bool = False,
     **functions: Callable[..., Any],
 ) -> Callable[..., None]:
-    """Return a test function, parametrised over every case that is asked of a solver.
+    """Return a test function, parametrised over every case of a solver.
 
-    Bind it to a name that pytest collects: `test_my_solver = laws(my_module)`, or
+    Bind the test to a name for pytest: `test_my_solver = laws(my_module)`, or
     `test_fk = laws(forward_kinematics=my_fk, ccd=my_ccd)`. A test fails with the sentence about
-    the error and with the mistake that explains it; a case below the rounding floor is skipped.
+    the error and with the likely mistake; a case below the rounding floor is skipped.
 
     Args:
         solver: a module or an object with functions by the tasks' names.
@@ -69,7 +69,7 @@ def laws(
 
 
 def _check(report: TaskReport, name: str) -> None:
-    """Fail if a case is not right; skip it if it is undecided."""
+    """Fail if a case is not right; skip an undecided case."""
     import pytest
 
     judgements = {judgement.case.name: judgement for judgement in report.judgements}

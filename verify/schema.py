@@ -58,7 +58,7 @@ def answer_name(task: str) -> str:
 
 
 def _greeting() -> dict[str, Any]:
-    """Return the schemas of the greeting and of its parts, as msgspec makes them, with an id."""
+    """Return the schemas of the greeting and of its parts, as from msgspec, with an id."""
     _, parts = msgspec.json.schema_components([Greeting], ref_template="#/$defs/{name}")
     greeting = parts.pop("Greeting")
     greeting["properties"] = {"id": _ID, **greeting["properties"]}
@@ -76,7 +76,7 @@ def _message(about: str, properties: dict[str, Any], required: list[str]) -> dic
 
 
 def _fields(fields: Iterable[Field]) -> dict[str, Any]:
-    """Return the schemas of fields: nested arrays, in which a count that is a word may be any."""
+    """Return the schemas of fields: nested arrays; a word stands for any count."""
     schemas = {}
     for field in fields:
         kind = _TYPES[field.kind]

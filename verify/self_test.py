@@ -1,7 +1,7 @@
-"""Test the judge: laws catch every known fault, the search names it, right programs are right.
+"""Test the judge: laws catch every known fault, the search names each, right programs are right.
 
-A fault is caught if a law calls an answer wrong, if the solver is judged by less than what it is
-sent, or if it is named beside a reservation; a mere reservation (RIGHT EXCEPT) does not count.
+A fault is caught if a law calls an answer wrong, or if the solver is judged by restricted requests.
+A fault named beside a reservation is caught as well; a mere reservation does not count.
 """
 
 from collections.abc import Iterator
@@ -19,7 +19,7 @@ from .task import TASKS
 from .verify import verify
 
 HONEST = "honest solvers"
-# Mistakes that answers do not tell apart from another mistake, which is named in their place.
+# Mistakes with the answers of another mistake, which is named in their place.
 EQUAL = {"PB-TRACK-021": "PB-TRACK-006"}
 # The families whose codes stand for many changes of a line, and for state of the process.
 WITHOUT_PROGRAMS = ("LINE", "STATE")
@@ -41,20 +41,20 @@ class Trial(NamedTuple):
     subject: Subject
     verdict: Verdict
     laws: frozenset[str]  # that were broken
-    named: bool  # whether the fault is named; of an honest solver, whether no fault is
+    is_named: bool  # whether the fault is named; of an honest solver, whether no fault is
     first_verdict: Verdict | None = None  # before any cause was sought
 
     @property
     def caught(self) -> bool:
         """Whether a law is broken, or the fault is named although no law is."""
-        return bool(self.laws) or (self.named and self.verdict > Verdict.RIGHT)
+        return bool(self.laws) or (self.is_named and self.verdict > Verdict.RIGHT)
 
     @property
     def passed(self) -> bool:
         """Whether the fault is caught and named, or the honest solver is not accused."""
         if self.subject.code:
-            return self.caught and self.named
-        return self.verdict <= Verdict.RIGHT_EXCEPT and self.named
+            return self.caught and self.is_named
+        return self.verdict <= Verdict.RIGHT_EXCEPT and self.is_named
 
 
 def attempt(subject: Subject) -> Trial:
@@ -76,7 +76,7 @@ def attempt(subject: Subject) -> Trial:
 
 
 def _codes(report: TaskReport) -> set[str]:
-    """Return the codes of the first explanation and the hints; of reservations if it is right."""
+    """Return the codes of the first explanation and hints; of reservations about right answers."""
     sentences = [explanation.sentence for explanation in report.diagnosis.explanations[:1]]
     sentences += report.diagnosis.hints
     if report.verdict is Verdict.RIGHT_EXCEPT:  # the mistake may be on purpose

@@ -1,8 +1,8 @@
-"""The tasks that a solver may offer, with the names and shapes of their inputs and outputs.
+"""The tasks of solvers, with the names and shapes of their inputs and outputs.
 
-The names are the keyword arguments of `reference`. The words in a shape stand for counts that are
-the same throughout a request: joint, frame, particle, spring, pin. A count that no input has, such
-as the number of points of a resampled curve, is up to the solver.
+The names are the keyword arguments of `reference`. The words in a shape stand for counts, equal
+throughout a request: joint, frame, particle, spring, pin. The solver chooses counts without an
+input, like the number of points of a resampled curve.
 """
 
 import tomllib
@@ -14,7 +14,7 @@ import numpy as np
 
 Kind = Literal["number", "integer", "boolean", "text"]
 FILE = Path(__file__).with_name("tasks.toml")
-# The tasks that a task builds upon, the last step of the computation first.
+# The foundations of each task, the last step of the computation first.
 BUILDS_ON = {
     "inverse_kinematics": ("forward_kinematics",),
     "track": ("inverse_kinematics", "forward_kinematics"),

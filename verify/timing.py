@@ -1,4 +1,4 @@
-"""The times that are compared: a solver's own, and the reference's for the same cases."""
+"""The compared times: a solver's own, and the reference's for the same cases."""
 
 import time
 from collections.abc import Callable

@@ -25,11 +25,11 @@ from .take.examination import Examiner
 from .task import BUILDS_ON
 from .timing import with_lesser_time
 
-# After so many timeouts in a task its other cases are not asked, nor are they asked again.
+# After so many timeouts in a task no more cases are asked, nor asked again.
 MAX_HANGS = 2
-# Tasks that are tried once for every method that the greeting names.
+# Tasks with a trial for every method of the greeting.
 WITH_METHODS = ("inverse_kinematics", "track")
-# Called with what is done, and the number of requests sent, and of all; None if they are not known.
+# Called with the present work, the number of sent requests, and of all requests (None if unknown).
 Notify = Callable[[Sentence, int, int | None], None]
 
 
@@ -47,7 +47,7 @@ def verify(
     notify: Notify = lambda work, count, total: None,
     publish: Callable[[Report], None] = lambda report: None,
 ) -> Report:
-    """Try a solver at its tasks, by default all that it offers, and return the report.
+    """Try a solver at its tasks, by default at all offered tasks, and return the report.
 
     The cases are random by the seed; there are more if `thorough`. All tasks are judged before the
     cause of any wrong answer is sought: after each, `publish` is called with the verdicts so far.
@@ -102,7 +102,7 @@ def _unfinished(count: int, total: int) -> Sentence:
 
 @dataclass
 class Attempt:
-    """A solver at a task: it is asked and judged, then its wrong answers are explained."""
+    """A solver at a task: requests and judgement, then the explanation of wrong answers."""
 
     connection: Connection
     task: str
@@ -114,7 +114,7 @@ class Attempt:
     unsent: Sentence | None = None  # that the last cases were not sent, if any
 
     def _ask(self, greeting: Greeting) -> Sequence[Exchange]:
-        """Return the answers to the cases that suit a greeting, which are asked once."""
+        """Return the answers to suitable cases of a greeting; each case is asked once."""
         key = repr(greeting)
         if key not in self.answers:
             cases = DISCIPLINES[self.task].cases(greeting, self.method, self.seed, self.thorough)
@@ -156,7 +156,7 @@ class Attempt:
     def explain(
         self, verdict: TaskReport, reports: Sequence[TaskReport], cause_search: CauseSearch
     ) -> TaskReport:
-        """Return the report on a verdict with the cause of wrong answers, if one is found in time.
+        """Return the report on a verdict with the cause of wrong answers, if found in time.
 
         `reports` are the reports on earlier tasks. The verdict stays.
         """
@@ -222,7 +222,7 @@ def _with_diagnosis(report: TaskReport, diagnose: Callable[[TaskReport], Diagnos
 def _unless_meant(report: TaskReport, original: TaskReport) -> TaskReport:
     """Return a report by restricted requests with the explanations of answers to all requests.
 
-    A false claim is no such explanation where the restriction is meant.
+    A false claim is no explanation where the restriction is meant.
     """
     explanations = original.diagnosis.explanations
     if report.verdict <= Verdict.UNDECIDED:
@@ -242,16 +242,16 @@ def _with_observations(report: TaskReport, observed: tuple[Sentence, ...]) -> Ta
 
 
 def _builds_on(task: str, method: str, report: TaskReport) -> bool:
-    """Return whether a task builds upon that of a report, which is wrong or may be."""
+    """Return whether a task builds upon the task of a report with wrong or doubtful answers."""
     is_earlier = report.task in BUILDS_ON.get(task, ()) and report.method in ("", method)
     is_assumed = bool(report.assumptions and report.diagnosis.explanations)
     return is_earlier and (report.verdict >= Verdict.WRONG or is_assumed)
 
 
 def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
-    """Return a report on unexplained answers that names the mistakes of the task it builds upon.
+    """Return a report on unexplained answers with the mistakes of the tasks below.
 
-    Claims that wrong poses may lead to explain nothing.
+    False claims by wrong poses explain nothing.
     """
     if report.verdict < Verdict.WRONG or not causes:
         return report
@@ -271,15 +271,15 @@ def _with_cause(report: TaskReport, causes: Sequence[TaskReport]) -> TaskReport:
         else "Its {task} is wrong as well: correct that first, since this may build upon it."
     )
     hint = Sentence(words.template, {"task": cause.task, "codes": ", ".join(codes)})
-    others = [other for other in diagnosis.hints if other != NO_NUMBERS]
-    diagnosis = replace(diagnosis, explanations=(), hints=(hint, *others))
+    hints = [words for words in diagnosis.hints if words != NO_NUMBERS]
+    diagnosis = replace(diagnosis, explanations=(), hints=(hint, *hints))
     return replace(report, diagnosis=diagnosis)
 
 
 def _with_methods(
     connection: Connection, tasks: Sequence[str] | None, seed: int
 ) -> tuple[Greeting, tuple[Sentence, ...]]:
-    """Return the greeting with the methods that answers show, and remarks on them."""
+    """Return the greeting with the methods of its answers, and remarks on these methods."""
     greeting = connection.greeting
     task = next((task for task in WITH_METHODS if task in (tasks or greeting.tasks)), None)
     if task is None or task not in greeting.tasks:
@@ -305,7 +305,7 @@ def judge_cases(
 ) -> TaskReport:
     """Ask a solver some cases of a task, judge its answers and explain wrong answers.
 
-    The arguments are those of `verify`.
+    The arguments are as of `verify`.
     """
     attempt = Attempt(connection, task, method, 0, False, notify)
     verdict = attempt.examine(attempt.exchange(cases))
@@ -342,7 +342,7 @@ def trials(greeting: Greeting, tasks: Sequence[str] | None = None) -> list[tuple
 def _ask(connection: Connection, cases: Sequence[Case], notify: Notify) -> list[Exchange]:
     """Ask each case, then each answered case a second time.
 
-    Forces and energies are asked again in reverse, so that remains of the last request show.
+    Forces and energies are asked again in reverse, to show remains of the last request.
     """
     answers, hangs, work = [], 0, sentence("asking {task}", task=cases[0].task if cases else "")
     for i, case in enumerate(cases):

@@ -55,7 +55,7 @@ def by_name():
 def test_fault_is_caught_and_named_and_honest_solver_is_right(name):
     trial = attempt(by_name()[name])
     assert trial.verdict is trial.first_verdict  # the search for the cause has not changed it
-    assert trial.passed, (trial.verdict, trial.laws, trial.named)
+    assert trial.passed, (trial.verdict, trial.laws, trial.is_named)
     if name.split(", ")[1] in set(PROGRAMS) - RESERVED:
         assert trial.verdict is Verdict.RIGHT
 

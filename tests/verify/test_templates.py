@@ -18,11 +18,7 @@ from plumbob.verify.greeting import Fixed, Greeting, Step, System
 from plumbob.verify.task import TASKS
 from plumbob.verify.templates import GREETING_FIELDS, LANGUAGES, template
 
-# The page leaves out the text of robots, which is in all requests of the judge.
-REQUESTS = [
-    request | ({"urdf": ""} if "axes" in request and "origins" in request else {})
-    for request, _ in TRANSCRIPT
-]
+REQUESTS = [request for request, _ in TRANSCRIPT]
 OFFERED = [
     "forward_kinematics", "inverse_kinematics", "mass_spring_step",
     "robot_inverse_kinematics", "robot_jacobian",

@@ -12,7 +12,7 @@ from .program import ProgramConnection
 
 __all__ = ["LIMITS", "ProcessLimits", "open_connection"]
 
-# After this share of its time a solver's line is noted, in case it takes longer.
+# After this share of its time a solver's line is noted, before a timeout.
 NOTED_AFTER = 0.6
 _HOME = str(Path(__file__).parents[3])
 # Our packages come first only while the host is loaded; then the solver's modules come first.
@@ -32,8 +32,8 @@ serve(spec, folder, float(patience))
 def open_connection(spec: str | Path | Sequence[str], limits: ProcessLimits = LIMITS) -> Connection:
     """Return a solver of any kind, whose process starts with the first request.
 
-    It is a command as a list of words; a Python file, file.py:object or module:object; a program's
-    file; or a folder of answers. Raise ValueError if there is none of that name.
+    `spec` is a command as a list of words; a Python file, file.py:object or module:object; a
+    program's file; or a folder of answers. Raise ValueError of an unknown name.
     """
     if not isinstance(spec, str | Path):
         return ProgramConnection(spec, limits=limits)

@@ -1,9 +1,9 @@
-"""Whether the times that a program claims agree with the processor time of its processes.
+"""Whether a program's claimed times agree with the processor time of its processes.
 
 A request costs time beside the solver's: JSON, pipes, garbage collection. A larger message costs no
-less, so that the cheapest of all as large bounds this cost, its solution included; far more is
-allowed. The claim is not taken off it: on a busy machine it holds time in which the process waited.
-Main threads only are looked at: others may compute beside them, or wait by spinning.
+less. So the cheapest request of at least this size bounds the cost, its solution included; far more
+is allowed. The claim is not subtracted: on a busy machine a claim includes waits of the process.
+Main threads alone are measured: other threads may compute beside, or wait by spinning.
 """
 
 from collections import deque
@@ -14,16 +14,16 @@ import numpy as np
 from plumbob.process.tree import family, main_thread_seconds
 from plumbob.text.sentence import Sentence, sentence
 
-# So many requests are compared, then again after as many more; the last ones are kept.
+# So many requests are compared, then again after as many more; the last requests are kept.
 COMPARED, WINDOW = 10, 40
-# A request contradicts its claim if it computes more than so many times as long, messages aside.
+# A request contradicts its claim by more than this multiple of processor time, messages aside.
 FACTOR = 10.0
 # Messages cost at most so much, and so much a byte [s]; so many times what is seen is allowed.
 MESSAGE, BYTE, ALLOWED = 5e-3, 3e-7, 3.0
 # Equal requests may differ by so much [s].
 NOISE = 5e-4
 
-# The seconds claimed, those that the busiest process computed, and the bytes of both messages.
+# The claimed seconds, the processor time of the busiest process, and the bytes of both messages.
 Request = tuple[float, float, int]
 
 
@@ -40,7 +40,7 @@ class ClaimedTimes:
         self._before = [main_thread_seconds(process) for process in self._processes]
 
     def end(self, claim: float, size: int) -> Sentence | None:
-        """Return why the times that are claimed cannot be, as far as is seen after this request."""
+        """Return why the claimed times are impossible, as far as known after this request."""
         now = map(main_thread_seconds, self._processes)
         computed = (after - before for after, before in zip(now, self._before, strict=True))
         self._requests.append((claim, max(computed, default=0.0), size))
@@ -58,7 +58,7 @@ class ClaimedTimes:
 
 
 def contradicts(requests: Sequence[Request]) -> bool:
-    """Return whether most requests compute far longer than is claimed for them."""
+    """Return whether most requests compute far longer than their claims."""
     claim, computed, size = np.array(sorted(requests, key=lambda request: -request[2])).T
     messages = np.minimum(np.minimum.accumulate(computed), MESSAGE + BYTE * size)
     excess = computed - claim - ALLOWED * messages - NOISE

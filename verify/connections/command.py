@@ -1,4 +1,4 @@
-"""The solver and the cases that a command line names."""
+"""The solver and the cases of a command line."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -29,7 +29,7 @@ def limits(seconds: float | None, mebibytes: int | None) -> ProcessLimits:
 
 
 def open_named(words: Sequence[str], limits: ProcessLimits, say: Say) -> Connection:
-    """Return the solver that the words of a command line name; raise ValueError if none."""
+    """Return the solver in the words of a command line; raise ValueError if none."""
     if words[:1] == [PROGRAM] and len(words) > 1:
         return open_connection(words[1:], limits)
     if words[:1] == [ANSWERS] and len(words) > 2:
@@ -54,7 +54,7 @@ def open_named(words: Sequence[str], limits: ProcessLimits, say: Say) -> Connect
 
 
 class CaseOptions(NamedTuple):
-    """The cases that a command line names; arguments as of `verify`."""
+    """The cases of a command line; arguments as of `verify`."""
 
     tasks: tuple[str, ...] = ()  # () for all that the solver offers
     rerun: Path | None = None  # a saved failing case, then the only one

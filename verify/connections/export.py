@@ -1,4 +1,4 @@
-"""Write cases into a folder, for a solver that is locked inside a program with windows."""
+"""Write cases into a folder, for a solver inside a program with windows."""
 
 import json
 from collections.abc import Sequence
@@ -20,10 +20,10 @@ README = Path(__file__).with_name("export_readme.txt").read_text(encoding="utf-8
 def export_cases(
     folder: Path, tasks: Sequence[str] | None = None, seed: int = 0, thorough: bool = False
 ) -> int:
-    """Write all cases that suit a solver, with instructions for the answers; return their number.
+    """Write all suitable cases of a solver, with instructions for the answers; return their number.
 
-    The folder is new or empty, or that of an earlier export, whose answers stay. Its greeting.json
-    says what suits the solver; without that, all tasks do. Raise ValueError if the folder holds
+    The folder is new, empty, or from an earlier export, whose answers stay. Its greeting.json
+    declares the solver; without this file all tasks suit. Raise ValueError if the folder holds
     something else, or greeting.json is not understood.
     """
     _check_is_export(folder)
@@ -43,7 +43,7 @@ def export_cases(
 def write_cases(
     folder: Path, cases: Sequence[Case], greeting: Greeting, seed: int = 0, thorough: bool = False
 ) -> None:
-    """Write these cases, each into a folder of its own; raise ValueError if two would share one."""
+    """Write these cases, each into a folder of its own; raise ValueError of a shared folder."""
     _check_is_export(folder)
     places: dict[str, Case] = {}
     for case in cases:

@@ -1,4 +1,4 @@
-"""A folder of exported cases, and the answers that a solver has written beside them."""
+"""A folder of exported cases, and a solver's answers beside the cases."""
 
 import json
 import re
@@ -37,7 +37,7 @@ def _plain(name: str) -> str:
 
 
 def read_greeting(folder: Path) -> Greeting:
-    """Return the greeting in greeting.json of a folder; raise ValueError without a valid one."""
+    """Return the greeting in greeting.json of a folder; raise ValueError of an invalid file."""
     path = folder / GREETING
     if not path.is_file():
         raise ValueError(f"answers: expected a folder of exported cases, got {folder}")
@@ -45,7 +45,7 @@ def read_greeting(folder: Path) -> Greeting:
 
 
 def _object(path: Path) -> dict[str, Any]:
-    """Return the JSON object of a file; raise ValueError if it holds something else."""
+    """Return the JSON object of a file; raise ValueError of other content."""
     # The host of Python solvers never needs this.
     from plumbob.reference.formats.source import read_bytes
 
@@ -60,9 +60,9 @@ def _object(path: Path) -> dict[str, Any]:
 
 
 class FileConnection:
-    """A solver that answers by files; `seed` and `thorough` are those of its cases.
+    """A solver with answers in files; `seed` and `thorough` are as of its cases.
 
-    Raise ValueError if it is no folder of exported cases.
+    Raise ValueError of a folder without exported cases.
     """
 
     def __init__(self, folder: Path) -> None:
@@ -74,7 +74,7 @@ class FileConnection:
 
     @property
     def remarks(self) -> tuple[Sentence, ...]:
-        """That an answer is never given twice, and which tasks have none."""
+        """On single answers, and on tasks without answers."""
         solved = self.greeting.tasks
         missing = ", ".join(task for task in self._offered().tasks if task not in solved)
         single = sentence(
@@ -85,9 +85,9 @@ class FileConnection:
 
     @property
     def greeting(self) -> Greeting:
-        """The greeting in greeting.json, with the tasks that have answers if there are any.
+        """The greeting in greeting.json, with the tasks of existing answers if any.
 
-        Raise NoGreetingError if it is not understood.
+        Raise NoGreetingError of an invalid greeting.
         """
         offered = self._offered()
         solved = {
@@ -103,7 +103,7 @@ class FileConnection:
         return msgspec.structs.replace(offered, tasks=tasks, methods=methods or offered.methods)
 
     def _has_answers(self, task: str, method: str) -> bool:
-        """Return whether a file stands beside the cases of a task that was not exported."""
+        """Return whether a file beside the cases of a task comes from another program."""
         files = (self.folder / _folder(task, method)).glob("*/[!.]*")
         return any(path.name != REQUEST for path in files)
 
@@ -131,13 +131,13 @@ class FileConnection:
 
 
 def _is_current(path: Path, case: Case) -> bool:
-    """Return whether the request that was exported is that of the case."""
+    """Return whether the exported request belongs to the case."""
     encoded = json.loads(message.encode_case(0, case))
     return path.is_file() and _object(path) | {"id": 0} == encoded
 
 
 def _read_answer(place: Path, case: Case) -> Answer | Failure:
-    """Return the answer in answer.json; raise ValueError if it is invalid."""
+    """Return the answer in answer.json; raise ValueError of invalid content."""
     if not (place / ANSWER).is_file():
         return Failure(FailureKind.ABSENT, _absent(place))
     answer = message.decode_answer(_object(place / ANSWER), TASKS[case.task], case.inputs, LONGEST)
@@ -148,7 +148,7 @@ def _read_answer(place: Path, case: Case) -> Answer | Failure:
 
 
 def _absent(place: Path) -> Sentence:
-    """Return that there is no answer, and which file was perhaps meant as an answer."""
+    """Return the sentence on a missing answer, with the file of a similar name."""
     for file in sorted({path.name for path in place.iterdir()} - {REQUEST}):
         if near := did_you_mean(file, [ANSWER]):
             return sentence(

@@ -1,8 +1,8 @@
-"""The child process that a Python solver lives in; it speaks the protocol of any program.
+"""The child process of a Python solver, with the protocol of any program.
 
 The protocol moves away from standard output before the solver is loaded: prints of the solver go
-to standard error and become a remark. Only the modules that answers need are loaded here, so that
-the solver meets no module of ours under a name of its own.
+to standard error and become a remark. Only the modules for answers are loaded here, so the
+solver meets no module of ours under a name of its own.
 """
 
 import contextlib
@@ -31,7 +31,7 @@ from ..task import TASKS
 # Functions by these names are methods of inverse kinematics where nothing declares methods.
 METHODS = ("ccd", "fabrik")
 INVERSE_KINEMATICS = "inverse_kinematics"
-# Names that a function of something else may have by chance.
+# Names of functions for other purposes by chance.
 COMMON_NAMES = frozenset({"track", "resample", "energy"})
 # How much of what is printed for a request is remarked and passed on [B].
 PRINT_SHOWN, PRINT_PASSED = 200, 4096
@@ -44,7 +44,7 @@ class OfferError(ValueError):
 class PythonSolver:
     """The functions of a Python file or object by task or method, and the fields of its greeting.
 
-    Raise OfferError if it offers no task, or its declaration is not understood.
+    Raise OfferError without an offered task, or of an invalid declaration.
     """
 
     def __init__(self, source: object, name: str, declared: object) -> None:
@@ -102,13 +102,13 @@ def _functions(source: object, methods: Sequence[Any]) -> dict[str, Callable[...
 
 
 def _is_meant(function: Callable[..., Any], name: str) -> bool:
-    """Return whether a function is of its task; under a common name it has to take an input."""
+    """Return whether a function is of its task; under a common name an input is needed."""
     inputs = TASKS[name].inputs if name in COMMON_NAMES else ()
     return not inputs or any(takes(function, definition.name) for definition in inputs)
 
 
 def _offers_nothing(source: object, name: str) -> str:
-    """Return why no task is offered: no names of tasks, or functions that take other arguments."""
+    """Return why no task is offered: no names of tasks, or functions of other arguments."""
     names = source if isinstance(source, Mapping) else dir(source)
     home = source.__name__ if inspect.ismodule(source) else None
     own = [
@@ -141,7 +141,7 @@ def _failed(failure: Failure) -> dict[str, Any]:
 def load(spec: str) -> PythonSolver:
     """Return the solver in a Python file, file:object or module:object.
 
-    Raise OfferError if it offers no task, and any exception of the solver while it is loaded.
+    Raise OfferError without an offered task, and any exception of the solver while loading.
     """
     place, _, attribute = spec.partition(":")
     path = Path(place)
@@ -171,7 +171,7 @@ def _load_file(path: Path) -> Any:
 
 
 class _Prints(io.RawIOBase):
-    """A stream that passes prints on to standard error and keeps their beginning."""
+    """A stream to standard error for prints; their beginning is kept."""
 
     def __init__(self) -> None:
         self.beginning = b""
@@ -187,7 +187,7 @@ class _Prints(io.RawIOBase):
         return len(text)
 
     def take(self) -> dict[str, str]:
-        """Return the beginning as a field of an answer, if there is any, and forget it."""
+        """Return the beginning as a field of an answer, if any, then forget the prints."""
         beginning, self.beginning = self.beginning, b""
         return {"printed": beginning.decode(errors="replace")} if beginning.strip() else {}
 
@@ -204,16 +204,16 @@ def _protocol_streams() -> Iterator[tuple[BinaryIO, BinaryIO, _Prints]]:
 
 @contextlib.contextmanager
 def _watched(patience: float) -> Iterator[None]:
-    """Note on standard error where the solver is, each time that the block lasts so long [s]."""
+    """Note on standard error where the solver is, each time the block lasts so long [s]."""
     faulthandler.dump_traceback_later(patience, repeat=True, file=2)
     yield
     faulthandler.cancel_dump_traceback_later()
 
 
 def serve(spec: str, folder: str, patience: float) -> None:
-    """Answer requests about a solver until they end.
+    """Answer requests about a solver until the end of input.
 
-    The folder is that of the solver and its other modules; after so much patience [s] its lines are
+    The solver and its other modules are in the folder; after so much patience [s] its lines are
     noted on standard error.
     """
     faulthandler.enable(all_threads=False)
@@ -232,7 +232,7 @@ def serve(spec: str, folder: str, patience: float) -> None:
 
 
 def load_safely(spec: str, folder: str) -> tuple[PythonSolver | None, dict[str, Any]]:
-    """Return the solver of `load`, or the fields of an answer that says why there is none."""
+    """Return the solver of `load`, or the fields of an answer with the reason for none."""
     try:
         return load(spec), {}
     except OfferError as error:

@@ -1,4 +1,4 @@
-"""The limits of a program, and the sentences for a program that exceeds them or ends."""
+"""The limits of a program, and the sentences on an exceeded limit or an ended program."""
 
 import os
 import signal
@@ -19,7 +19,7 @@ _HIDDEN = (
     *(str(Path(__file__).parents[1]), 'File "<string>"'),
     *("Extension modules:", "Timeout (", "Thread 0x"),
 )
-# What Python prints below a line to mark a part of it.
+# Python's marks below a part of a line.
 _MARKS = " ^~"
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
@@ -27,12 +27,12 @@ _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="u
 class ProcessLimits(NamedTuple):
     """The limits of a program."""
 
-    # for the greeting, and for the first request of each task, when it compiles [s]
+    # for the greeting, and for the first request of each task, with compilation [s]
     first: float = 30.0
     request: float = 10.0  # for any other request [s]
     leave: float = 2.0  # to end once its input has ended [s]
     memory: int = 4 << 30  # together with all that it starts [B]
-    # the longest line that it may answer, read within seconds whatever it holds [B]
+    # the longest line of an answer, read within seconds whatever its content [B]
     line: int = 1 << 24
     prints: int = 10_000  # the most lines beside an answer
 
@@ -109,7 +109,7 @@ def not_started(program: str, error: Exception) -> FailureError:
 
 
 def departure(process: ChildProcess, patience: float) -> tuple[Sentence, ...]:
-    """End a program's input, then all that still runs; return remarks on how it left."""
+    """End a program's input, then all running processes; return remarks on the departure."""
     has_left, strays = process.leave(patience)
     code = process.code if has_left else 0
     values = {"count": strays, "how": ending(code)}

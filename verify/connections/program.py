@@ -41,7 +41,7 @@ class ProgramConnection:
 
     @property
     def greeting(self) -> Greeting:
-        """Its description of itself; raise NoGreetingError if it does not start or greet."""
+        """Its description of itself; raise NoGreetingError without a start or a greeting."""
         if self._greeting is None:
             try:
                 self._ready()
@@ -52,7 +52,7 @@ class ProgramConnection:
         return self._greeting
 
     def answer(self, case: Case) -> Answer | Failure:
-        """Send a request; a program that is lost is started again when the next case comes."""
+        """Send a request; a lost program is started again for the next case."""
         try:
             return self._answer(self._ready(), case)
         except FailureError as error:
@@ -60,7 +60,7 @@ class ProgramConnection:
             return error.failure
 
     def close(self) -> None:
-        """End its input, then it and whatever it has started."""
+        """End the program's input, then the program with all its processes."""
         process, self._process = self._process, None
         if process is not None:
             remarks = departure(process, self._limits.leave)
@@ -122,7 +122,7 @@ class ProgramConnection:
     def _exchange(
         self, process: ChildProcess, line: bytes, patience: float
     ) -> tuple[Mapping[str, Any], float, int]:
-        """Send a request; return its answer, how long it took, and how many bytes came back."""
+        """Send a request; return its answer, the round trip [s], and the received bytes."""
         start, size = time.monotonic(), 0
         process.send(line)
         for _ in range(self._limits.prints + 1):

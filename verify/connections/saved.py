@@ -1,4 +1,4 @@
-"""Failing cases as files that `--rerun` asks again, generated from their names and the seed."""
+"""Failing cases as files for `--rerun`, generated from their names and the seed."""
 
 import re
 import shlex
@@ -18,12 +18,12 @@ from ..judgement import TaskReport
 from ..message import plain
 
 FORMAT, VERSION = "plumbob failing case", 1
-# A case with the longest answer that is read, with indentation, has fewer bytes.
+# A case with the longest readable answer, with indentation, has fewer bytes.
 _LARGEST = 1 << 28
 
 
 class SavedCase(msgspec.Struct, frozen=True):
-    """The task, seed and name that identify a case; its request and answers are for a reader."""
+    """The task, seed and name of a case; its request and answers are for a reader."""
 
     task: str
     method: str
@@ -58,9 +58,9 @@ def save(report: TaskReport, folder: Path, seed: int, thorough: bool) -> Path | 
 
 
 def _file_name(report: TaskReport) -> str:
-    """Return the task and the method in letters of any file system; methods that differ share none.
+    """Return the task and the method in letters of any file system, a name for each method.
 
-    A method of other letters, or capital ones, is told apart by a digest.
+    A method of other or capital letters has a digest.
     """
     name = re.sub(r"[^A-Za-z0-9_]+", "-", f"{report.task} {report.method}").strip("-")[:100]
     if name == f"{report.task}-{report.method}".strip("-").lower():
@@ -69,7 +69,7 @@ def _file_name(report: TaskReport) -> str:
 
 
 def load(path: Path) -> SavedCase:
-    """Return the case in a file; raise ValueError if it holds none or cannot be read."""
+    """Return the case in a file; raise ValueError of an unreadable file or other content."""
     try:
         saved = msgspec.json.decode(read_bytes(path, largest=_LARGEST), type=SavedCase)
     except (msgspec.MsgspecError, RecursionError, UnicodeDecodeError):
@@ -80,7 +80,7 @@ def load(path: Path) -> SavedCase:
 
 
 def cases_of(saved: SavedCase, cases: Sequence[Case]) -> list[Case]:
-    """Return a saved case after the cases that it refers to; raise ValueError if it is unknown."""
+    """Return a saved case after its references; raise ValueError of an unknown case."""
     by_name = {case.name: case for case in cases}
     if saved.name not in by_name:
         raise ValueError(
@@ -99,7 +99,7 @@ def cases_of(saved: SavedCase, cases: Sequence[Case]) -> list[Case]:
 
 
 def command(solver: Sequence[str], path: Path) -> Sentence:
-    """Return the shell command that asks a saved case again."""
+    """Return the shell command to repeat a saved case."""
     return sentence(
         "plumbob verify --rerun {path} {solver}",
         path=shlex.quote(str(path)),

@@ -1,4 +1,4 @@
-"""An answer beside the expected answer: the numbers in which they differ, and points to draw."""
+"""An answer beside the expected answer: differing numbers, and points to draw."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
@@ -12,19 +12,19 @@ from ..exchange import Answer
 from ..judgement import CaseJudgement
 
 Outputs = Mapping[str, Any]
-# Differences below this part of the largest one are not where two answers part, unless they are
-# above the next part of the largest number.
+# Two answers part at differences above this part of the largest difference, or above the next part
+# of the largest number.
 _PARTING = 0.01
-# An output that differs by less than this part of another one is rounded, not wrong.
+# An output is rounded, not wrong, if its difference is below this part of another output's.
 _ROUNDED = 1e-4
-# So are numbers that differ by less than this part of the largest number of their output.
+# So are numbers within this part of the largest number of their output.
 _ROUNDING = 1e-12
 # The length of the longest force arrow, relative to the system's extent.
 _ARROW = 0.3
 
 
 class NumberRow(NamedTuple):
-    """Numbers that should be equal."""
+    """Numbers to be equal."""
 
     label: str
     answer: list[float]
@@ -32,7 +32,7 @@ class NumberRow(NamedTuple):
 
 
 class Wireframe(NamedTuple):
-    """Points (point, 3) and the pairs of them (line, 2) that a line joins."""
+    """Points (point, 3), and lines as pairs of point indices (line, 2)."""
 
     points: FloatArray
     lines: FloatArray
@@ -84,16 +84,15 @@ def rows(judgement: CaseJudgement, count: int = 3) -> list[NumberRow]:
     largest = max(filter(np.isfinite, gaps), default=0.0)
     wrong = [i for i, gap in enumerate(gaps) if gap >= _ROUNDED * largest]
     if wrong:
-        kept = _first_and_largest([gaps[i] for i in wrong], count)
-        return [differing[wrong[i]] for i in kept]
+        return [differing[wrong[i]] for i in _first_and_largest([gaps[i] for i in wrong], count)]
     inputs, outputs = judgement.case.inputs, judgement.answer.values
     return (_disagreeing(inputs, outputs, count) or _effector(inputs, outputs))[:count]
 
 
 def _first_and_largest(gaps: Sequence[float], count: int) -> list[int]:
     """Return the indices of the first gaps, among them the index of the largest gap."""
-    kept, largest = list(range(len(gaps)))[:count], int(np.argmax(gaps))
-    return kept if largest in kept else [*kept[:-1], largest]
+    indices, largest = list(range(len(gaps)))[:count], int(np.argmax(gaps))
+    return indices if largest in indices else [*indices[:-1], largest]
 
 
 def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[NumberRow]:
@@ -106,10 +105,10 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
     if a.ndim:
         gaps = gaps.max(-1)
     size = np.abs(b).max(initial=0.0) or np.abs(a[np.isfinite(a)]).max(initial=0.0)
-    least = max(min(_PARTING * gaps.max(initial=0.0), _ROUNDED * size), _ROUNDING * size)
-    parting = [tuple(index) for index in np.argwhere((gaps > 0.0) & (gaps >= least)).tolist()]
-    kept = _first_and_largest([gaps[i] for i in parting], count) if parting else []
-    indices = [parting[i] for i in kept]
+    threshold = max(min(_PARTING * gaps.max(initial=0.0), _ROUNDED * size), _ROUNDING * size)
+    parting = [tuple(index) for index in np.argwhere((gaps > 0.0) & (gaps >= threshold)).tolist()]
+    places = _first_and_largest([gaps[i] for i in parting], count) if parting else []
+    indices = [parting[i] for i in places]
     return [
         NumberRow(
             f"{name}[{', '.join(map(str, i))}]" if i else name,
@@ -120,7 +119,7 @@ def _of_output(name: str, answer: Any, expected: Any, count: int) -> list[Number
 
 
 def _disagreeing(inputs: Outputs, outputs: Outputs, count: int) -> list[NumberRow]:
-    """Return the answered positions that are not where the answered rotations put them."""
+    """Return the answered positions away from the positions by the answered rotations."""
     if "target" not in inputs or not {"positions", "local_rotations"} <= outputs.keys():
         return []
     placed = _positions(inputs, {"local_rotations": outputs["local_rotations"]})
@@ -131,7 +130,7 @@ def _disagreeing(inputs: Outputs, outputs: Outputs, count: int) -> list[NumberRo
 
 
 def _effector(inputs: Outputs, outputs: Outputs) -> list[NumberRow]:
-    """Return the position of the effector beside its target, if the case has one that it misses."""
+    """Return the position of the effector beside a missed target, if any."""
     positions = _positions(inputs, outputs) if "target" in inputs else None
     if positions is None:
         return []
@@ -142,7 +141,7 @@ def _effector(inputs: Outputs, outputs: Outputs) -> list[NumberRow]:
 
 
 def texts(row: NumberRow) -> tuple[str, str]:
-    """Return both sides of a row, with the fewest digits that show their largest difference."""
+    """Return both sides of a row, with the fewest digits for their largest difference."""
     gaps = [
         0.0 if a == b else abs(a - b) if np.isfinite([a, b]).all() else np.inf
         for a, b in zip(row.answer, row.expected, strict=True)
@@ -158,8 +157,8 @@ def texts(row: NumberRow) -> tuple[str, str]:
 def drawing_of(judgement: CaseJudgement) -> CaseDrawing | None:
     """Return the wireframes of a case, or None if there are none."""
     inputs, task = judgement.case.inputs, judgement.case.task
-    answered = judgement.answer.values if isinstance(judgement.answer, Answer) else {}
-    answer, expected = (_shape(task, inputs, x) for x in (answered, judgement.expected))
+    answer_values = judgement.answer.values if isinstance(judgement.answer, Answer) else {}
+    answer, expected = (_shape(task, inputs, x) for x in (answer_values, judgement.expected))
     if answer is None and expected is None:
         return None
     request, marks = None, np.empty((0, 3))
@@ -175,7 +174,7 @@ def drawing_of(judgement: CaseJudgement) -> CaseDrawing | None:
 
 
 def _shape(task: str, inputs: Outputs, outputs: Outputs) -> Wireframe | None:
-    """Return an answer as points and lines, None if it has no shape."""
+    """Return an answer as points and lines, or None."""
     if not outputs:
         return None
     if task in ("forward_kinematics", "inverse_kinematics", "track"):

@@ -18,7 +18,7 @@ from .comparison import CaseDrawing, Wireframe
 
 # Differences below the first share of the extent are magnified to about the second.
 _VISIBLE, _MAGNIFIED = 0.02, 0.2
-# Smaller shares are left: they may be the rounding of single precision.
+# Smaller shares stay: the rounding of single precision may cause such differences.
 _ROUNDING = 1e-6
 # Points are numbered if there are no more than this.
 _NUMBERED = 12
@@ -62,7 +62,7 @@ def svg(drawing: CaseDrawing, title: str) -> Markup:
 
 
 def _visible_points(drawing: CaseDrawing) -> dict[str, FloatArray]:
-    """Return the points of each shape, NaN where they are far from the right answer."""
+    """Return the points of each shape, NaN far from the right answer."""
     shapes = {name: getattr(drawing, name) for name in _STYLES}
     points = {name: np.zeros((0, 3)) if s is None else s.points for name, s in shapes.items()}
     points["marks"] = drawing.marks
@@ -115,7 +115,7 @@ def _to_text(figure: Figure, title: str) -> str:
 
 
 def distance(drawing: CaseDrawing) -> float | None:
-    """Return the largest distance of an answered point from the expected one [m], if known."""
+    """Return the largest distance of an answered point from the expected point [m], if known."""
     if drawing.answer is None or drawing.expected is None:
         return None
     a, b = drawing.answer.points, drawing.expected.points

@@ -78,7 +78,7 @@ def _listed(faults: Sequence[CodedFault], say: Say) -> Iterator[str]:
 
 
 def explained(fault: CodedFault, say: Say) -> Iterator[str]:
-    """Yield the cause of a fault, its remedy, the lines that differ, and what goes wrong."""
+    """Yield the cause of a fault, its remedy, the differing lines, and the symptom."""
     cause, remedy = cause_and_remedy(fault, say)
     yield f"{fault.code}  {say(Sentence(FAMILIES[fault.family]['about'], {}))}"
     yield from _section(sentence("Cause"), wrapped(cause, "  "), say)
@@ -102,7 +102,7 @@ def cause_and_remedy(fault: CodedFault, say: Say) -> tuple[str, str]:
 
 
 def changed_lines(fault: CodedFault) -> list[str]:
-    """Return the lines that differ between the wrong and the right program, as a diff."""
+    """Return the difference between the wrong and the right program, as a diff."""
     wrong, right = fault.wrong_program.splitlines(), fault.right_program.splitlines()
     lines = []
     for line in list(unified_diff(wrong, right, n=CONTEXT, lineterm=""))[2:]:
@@ -128,9 +128,9 @@ def _symptom(fault: CodedFault, say: Say) -> Iterator[str]:
 
 
 def failure_of(fault: CodedFault) -> CaseJudgement | None:
-    """Judge the wrong program on its cases until one fails; return that, or None.
+    """Judge the wrong program on its cases until a case fails; return its judgement, or None.
 
-    A single sweep that only differs from the textbook's stands back behind a whole solve.
+    A failing whole solve is shown before a single sweep unlike the textbook's.
     """
     connection, seed = connection_to(fault.wrong_program), 0
     ((task, method),) = trials(connection.greeting, [fault.task])

@@ -1,4 +1,4 @@
-"""The files that `verify` writes: JSON, JUnit XML, a page, failing cases."""
+"""The files of `verify`: JSON, JUnit XML, a page, failing cases."""
 
 import sys
 from collections.abc import Callable
@@ -29,7 +29,7 @@ class WriteFailure(NamedTuple):
 
 
 class Files(NamedTuple):
-    """The files to write, None for none; a folder gets all of them and the failing cases."""
+    """The files to write, None for none; a folder gets all files and the failing cases."""
 
     json: Path | None
     junit: Path | None
@@ -47,7 +47,7 @@ class Files(NamedTuple):
     def save(
         self, report: Report, options: CaseOptions, context: Presentation
     ) -> tuple[list[Path], Presentation, list[WriteFailure]]:
-        """Write the files; return them, the context with the failing cases, and the failures."""
+        """Write the files; return paths, the context with the failing cases, and the failures."""
         failures: list[WriteFailure] = []
         folder = self.folder / "failures" if self.folder else FAILURES
         arguments = folder, options.seed, options.thorough
@@ -72,8 +72,8 @@ class Files(NamedTuple):
     def write(self, report: Report, options: CaseOptions, context: Presentation) -> int:
         """Write the files, print the screen, and return the exit code.
 
-        It is 2 if a file cannot be written, and 3 if the judge failed at a task and the others are
-        right. A mistake of ours in a screen or a file leaves it to the verdict.
+        The code is 2 if a file cannot be written, and 3 if the judge failed at a task and the other
+        tasks are right. Our own mistake in a screen or a file leaves the code to the verdict.
         """
         finished, context, failures = self.save(report, options, context)
         if _attempt(SCREEN, partial(_show, report, context), failures):

@@ -18,7 +18,7 @@ Record = dict[str, Any]
 
 
 def text(report: Report, say: Say) -> str:
-    """Return the file's text; numbers that are not finite are null."""
+    """Return the file's text; NaN and infinity are null."""
     fields = all_visible(msgspec.to_builtins(record(report, say), enc_hook=plain))
     return msgspec.json.format(msgspec.json.encode(fields), indent=1).decode() + "\n"
 
@@ -38,7 +38,7 @@ def _name(subject: Report | TaskReport | CaseJudgement | Finding) -> str:
 
 
 def _task(task: TaskReport, say: Say) -> Record:
-    """Return a task, or one method of it."""
+    """Return a task, or a method of inverse kinematics."""
     diagnosis = task.diagnosis
     behaviour, first_broken = diagnosis.behaviour, diagnosis.first_broken
     return {

@@ -9,7 +9,7 @@ from ..exchange import Answer
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict
 from .words import explanations, title
 
-# JUnit's element for a verdict that is not good.
+# JUnit's element for a bad verdict.
 _ELEMENTS = {Verdict.UNDECIDED: "skipped", Verdict.WRONG: "failure", Verdict.BROKEN: "error"}
 
 

@@ -55,7 +55,7 @@ def _long(task: Task, say: Say) -> Iterator[str]:
 
 
 def starter(language: str, folder: Path, say: Say) -> list[str]:
-    """Write the files of a starter and return what to do next; raise ValueError if one exists."""
+    """Write the files of a starter and return the next steps; raise ValueError if a file exists."""
     from ..templates import LANGUAGES, template
 
     texts = template(language)
@@ -122,5 +122,5 @@ def _sum(family: str | Sentence, members: list["Trial"]) -> Sentence:
     return sentence(
         "{family}: {n} faults planted, {caught} caught by a law, {named} named.",
         family=family, n=n, caught=sum(trial.caught for trial in members),
-        named=sum(trial.named for trial in members),
+        named=sum(trial.is_named for trial in members),
     )  # fmt: skip

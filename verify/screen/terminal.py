@@ -36,7 +36,7 @@ WIDTH = 80
 _PIECE = re.compile(
     r"[\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]|[^\s\u3000-\u30ff\u3400-\u9fff\uff00-\uffef]+|\s+"
 )
-# Marks that begin no line, and marks that end no line.
+# Marks never at the start of a line, and marks never at the end.
 _CLOSING, _OPENING = "，。、；：！？）》」』”’", "（《「『"
 _PLAIN: dict[str, Any] = {"highlight": False, "markup": False, "emoji": False}
 _COLOURS = dict(zip(Verdict, ("green", "yellow", "yellow", "red", "red"), strict=True))
@@ -70,7 +70,7 @@ def _table(tasks: Sequence[TaskReport], say: Say) -> list[str]:
 
 
 def _grid(rows: Sequence[Sequence[str]], sides: str, size: int = _WIDEST) -> list[str]:
-    """Return rows in columns; the first column gets the space that the others leave."""
+    """Return rows in columns; the first column gets the remaining space."""
     grid = Table.grid(padding=(0, 2, 0, 0))
     for i, side in enumerate(sides):
         grid.add_column(justify="right" if side == "r" else "left", no_wrap=i > 0, overflow="fold")
@@ -86,9 +86,9 @@ def _summary(task: TaskReport, say: Say, texts: set[str]) -> list[str]:
     whole = {say(words): words for words in reservations(task)}
     parts = {text for text in whole for other in whole if text != other and text in other}
     words = [without_repetition(words, texts) for text, words in whole.items() if text not in parts]
-    first, *others = dict.fromkeys(map(say, words))
+    first, *remaining_texts = dict.fromkeys(map(say, words))
     rows = wrapped(f"{title(task)}: {first}", "  ")
-    return [*rows, *(row for text in others for row in wrapped(text, "    "))]
+    return [*rows, *(row for text in remaining_texts for row in wrapped(text, "    "))]
 
 
 def _all_details(tasks: Sequence[TaskReport], context: Presentation, texts: set[str]) -> list[str]:
@@ -110,7 +110,7 @@ def _details(task: TaskReport, context: Presentation, texts: set[str]) -> list[s
     if failure is None:
         return paragraphs(reservations(task), say, "  ")
     failures = smallest_failures(task.judgements, task.diagnosis.explained)
-    # what is BROKEN has no numbers: then those of the WRONG case stand below its complaint, last
+    # BROKEN cases have no numbers: the numbers of the WRONG case stand below its complaint, last
     failures.sort(key=lambda other: other.verdict, reverse=True)
     words = [without_repetition(words, texts) for words in explanations(task)]
     rows = paragraphs(words, say, "  ")

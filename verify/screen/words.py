@@ -13,7 +13,7 @@ from ..exchange import Failure
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict
 
 GOOD = (Verdict.RIGHT, Verdict.RIGHT_EXCEPT)
-# In the answers of starters that nobody has filled in.
+# A part of the answers of unwritten starters.
 UNWRITTEN = "is not written yet"
 STEPS = ("mass_spring_step", "mass_spring_motion")
 VERDICTS = {
@@ -35,13 +35,13 @@ class Presentation(NamedTuple):
     files: Mapping[tuple[str, str], Path] = {}
 
     def command(self, task: TaskReport) -> Sentence | None:
-        """Return the command that asks the saved case of a task again, None if there is none."""
+        """Return the command to repeat the saved case of a task, or None."""
         path = self.files.get((task.task, task.method))
         return saved.command(self.solver, path) if path else None
 
 
 def speaker(language: str) -> Say:
-    """Return a function that translates a sentence to a line of printable text."""
+    """Return a translator of sentences to lines of printable text."""
     translate = translator(language)
     return lambda words: visible(words.text(translate))
 
@@ -52,7 +52,7 @@ def title(report: TaskReport) -> str:
 
 
 def passed(report: TaskReport) -> str:
-    """Return the number of cases that are RIGHT or RIGHT EXCEPT, and of all."""
+    """Return the number of RIGHT and RIGHT EXCEPT cases, and of all."""
     count = sum(judgement.verdict in GOOD for judgement in report.judgements)
     return f"{count}/{len(report.judgements)}"
 
@@ -68,12 +68,12 @@ def verdict_line(report: TaskReport) -> Sentence:
 
 
 def digits(subject: TaskReport | CaseJudgement) -> str:
-    """Return the number of correct digits, a dash if it cannot be counted."""
+    """Return the number of correct digits, a dash without a count."""
     return "–" if subject.digits is None else f"{max(0.0, subject.digits):.1f}"
 
 
 def speed(report: TaskReport, say: Say) -> str:
-    """Return the speed of a solver relative to the reference, a dash if it is not measured."""
+    """Return the speed of a solver relative to the reference, a dash without a measurement."""
     if report.untimed:
         return say(sentence("not timed"))
     if report.slowdown is None:
@@ -89,7 +89,7 @@ def speed(report: TaskReport, say: Say) -> str:
 
 
 def introduction(report: Report) -> Sentence:
-    """Return the solver's name, version and language, and its precision if it is as declared."""
+    """Return the solver's name, version and language, and its declared precision."""
     greeting = report.greeting
     name = " ".join(filter(None, (greeting.name, greeting.version)))
     language = sentence(", {language}", language=greeting.language) if greeting.language else ""
@@ -147,7 +147,7 @@ def explanations(report: TaskReport) -> Iterator[Sentence]:
 def reservations(task: TaskReport) -> list[Sentence]:
     """Return mistakes, each kind of the worst complaints about right answers, and the behaviour.
 
-    Of each kind it is the complaint with the largest error.
+    Each kind is represented by the complaint with the largest error.
     """
     kinds: dict[tuple[str, str], Sentence] = {}
     for judgement in task.judgements:
@@ -157,12 +157,12 @@ def reservations(task: TaskReport) -> list[Sentence]:
             if kind not in kinds or _error_in(complaint) > _error_in(kinds[kind]):
                 kinds[kind] = complaint
     mistakes = [words for words in explanations(task) if codes_in(words)]
-    others = [words for words in explanations(task) if words not in mistakes]
-    return [*mistakes, *kinds.values(), *others]
+    other_sentences = [words for words in explanations(task) if words not in mistakes]
+    return [*mistakes, *kinds.values(), *other_sentences]
 
 
 def _error_in(words: Sentence) -> float:
-    """Return the error that a complaint names, or the part of it after the frame, else 0."""
+    """Return the error in a complaint, or in its part after the frame, else 0."""
     parts = [words, *(part for part in words.values.values() if isinstance(part, Sentence))]
     errors = [part.values.get("error") for part in parts]
     return max((float(error) for error in errors if isinstance(error, int | float)), default=0.0)

@@ -1,1 +1,1 @@
-"""What a program takes: restrictions, constants, precision, zeros, and state that it keeps."""
+"""What a program takes: restrictions, constants, precision, zeros, and kept state."""

@@ -1,4 +1,4 @@
-"""Constants that a solver has in place of inputs, measured from its answers."""
+"""Constants of a solver in place of inputs, measured from its answers."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -20,24 +20,24 @@ from ..kinematics.sweeps import PoseTrial
 from ..kinematics.textbook import SOLVERS, Choices
 from .examination import SAME, TRIALS, outputs_of
 
-# What a program may say of a solve by an input that does not change the pose.
+# Outputs about a solve; inputs without an effect on the pose may change these outputs.
 CLAIMS = {"residual", "iterations", "converged"}
-# What two requests hold that differ in an input, with which right answers change.
+# Two values of an input by which right answers differ, and other inputs for both requests.
 CHANGES: Mapping[str, tuple[Mapping[str, Any], Mapping[str, Any]]] = {
     "tolerance": ({"max_iterations": 100, "tolerance": 0.0}, {"tolerance": 0.1}),
     "max_iterations": ({"max_iterations": 100, "tolerance": 0.0}, {"max_iterations": 1}),
     "h": ({"h": 0.01}, {"h": 0.02}),
     "gravity": ({"gravity": np.array([0.0, -9.81, 0.0])}, {"gravity": np.array([1.0, -8.0, 3.0])}),
 }
-# A distance that ends solves is no larger than this share of the reach, and than this [m].
+# Distances at the ends of solves are at most this share of the reach, and this distance [m].
 LOOSEST, FARTHEST = 0.02, 0.1
-# The most sweeps that are counted, and the orders of joints in them.
+# The largest number of counted sweeps.
 MOST_SWEEPS = 200
 # A constant distance ends solves at this scale too; other ends become as many times smaller.
 SCALE = 0.25
 # The longest step of a greeting [s].
 LONGEST = 1.0
-# The energies that gravity changes.
+# The energies with a part of gravity.
 ENERGIES = ("gravitational", "potential", "total")
 
 
@@ -53,17 +53,19 @@ def is_unread(connection: Connection, report: TaskReport, name: str) -> bool:
     cases = [j.case for j in _unlimited(report) if not {"sweeps", "of"} & {*j.case.facts}]
     first, second = CHANGES[name]
     for case in sorted(cases, key=lambda case: -case.size)[:TRIALS]:
-        one, other = (
+        outputs, other_outputs = (
             outputs_of(connection, case, {**first, **change}) for change in (first, second)
         )
-        names = one.keys() - CLAIMS
-        if not names or any(largest_gap(one[n], other.get(n, np.inf)) > SAME for n in names):
+        names = outputs.keys() - CLAIMS
+        if not names or any(
+            largest_gap(outputs[n], other_outputs.get(n, np.inf)) > SAME for n in names
+        ):
             return False
     return bool(cases)
 
 
 def _unlimited(report: TaskReport) -> list[CaseJudgement]:
-    """Return the judgements of cases without limits of joints that have to be answered."""
+    """Return the judgements of obligatory cases without limits of joints."""
     judgements = (j for j in report.judgements if j.case.requirement == "must")
     return [j for j in judgements if "cones" not in j.case.inputs]
 
@@ -71,8 +73,8 @@ def _unlimited(report: TaskReport) -> list[CaseJudgement]:
 def tolerance(connection: Connection, report: TaskReport) -> Constant | None:
     """Return the least round number above the distances at which solves end [m].
 
-    It is 0 if they end as near as they are asked to, None if most end far from their targets, or do
-    not make the sweeps of their method.
+    The number is 0 if solves end as near as requested. None stands for ends far from most targets,
+    or for sweeps of another method.
     """
     if max_iterations(connection, report) is None:
         return None
@@ -115,9 +117,9 @@ def _ends_of_smaller(connection: Connection, report: TaskReport) -> list[float]:
 
 
 def max_iterations(connection: Connection, report: TaskReport) -> Constant | None:
-    """Return the number of sweeps that a solver makes, of other solvers the number allowed.
+    """Return the number of sweeps of a solver, of other solvers the allowed number.
 
-    It is None if a solver does not make the sweeps of its method.
+    None stands for sweeps of another method.
     """
     count = _sweeps(connection, report)
     if count is None and report.method.lower() in SOLVERS:
@@ -127,9 +129,9 @@ def max_iterations(connection: Connection, report: TaskReport) -> Constant | Non
 
 
 def _sweeps(connection: Connection, report: TaskReport) -> int | None:
-    """Return the number of a textbook's sweeps that a solver makes, None if it makes no such.
+    """Return the number of a textbook's sweeps in the solves of a solver, None for other sweeps.
 
-    Targets are beyond reach, so that only the number of sweeps ends a solve.
+    Targets are beyond reach, so only the number of sweeps ends a solve.
     """
     fixed = Fixed(max_iterations=1, tolerance=problems.LOOSE)
     greeting = msgspec.structs.replace(connection.greeting, fixed=fixed)
@@ -159,7 +161,7 @@ def _exchange(connection: Connection, report: TaskReport, case: Case) -> Exchang
 
 
 def _gaps(trial: PoseTrial, method: str, root_first: bool) -> list[float]:
-    """Return how far a pose is from that after each of a textbook's sweeps, over the reach."""
+    """Return the distances from a pose to the poses after a textbook's sweeps, over the reach."""
     inputs, gaps = {**trial.case.inputs, "tolerance": 0.0, "max_iterations": 1}, []
     for _ in range(MOST_SWEEPS):
         inputs["local_rotations"], x, _ = solve(method, inputs, Choices(root_first=root_first))
@@ -173,7 +175,7 @@ def _flight(report: TaskReport) -> Case | None:
 
 
 def gravity(connection: Connection, report: TaskReport) -> Constant | None:
-    """Return the acceleration of a free particle [m/s²], None if answers do not tell it."""
+    """Return the acceleration of a free particle [m/s²], or None."""
     case = _flight(report)
     if case is None:
         return None

@@ -11,7 +11,7 @@ from ..judgement import CaseJudgement, TaskReport, Verdict
 
 # The most requests in which an input is changed.
 TRIALS = 3
-# Answers that differ by less are the same, in any unit.
+# Smaller differences between answers are none, in any unit.
 SAME = 1e-12
 
 
@@ -23,10 +23,10 @@ class Examination(Protocol):
         """The solver."""
 
     def judge(self, greeting: Greeting, exchanges: Sequence[Exchange] | None = None) -> TaskReport:
-        """Judge answers by a greeting: those given, or else to requests that suit the greeting."""
+        """Judge the given answers by a greeting, or else answers to suitable requests."""
 
 
-# An examiner returns the report with what it finds, or the same report.
+# An examiner returns the report with its findings, or the same report.
 Examiner = Callable[[Examination, TaskReport], TaskReport]
 
 

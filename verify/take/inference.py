@@ -1,8 +1,8 @@
 """Infer the restrictions of a solver from its answers.
 
 A solver with wrong answers may be right on chains, with a single mass for all particles or in a
-plane. It is asked whether its answers change with an input, or come at all. If they do not, it is
-judged by requests that do not need the input, and the report says so.
+plane. Changed requests show whether answers depend on an input, or come at all. Without either, the
+solver is judged by requests without a need of the input, and the report says so.
 """
 
 import json
@@ -36,13 +36,13 @@ WITHOUT_NUMBER: Mapping[str, Sentence] = {
     "max_iterations": sentence("Judged by whole solves"),
 }
 NUMBER = sentence("N is a number of your program, which its answers do not show.")
-# Methods of inverse kinematics that a program may know without declaring them.
+# Methods of inverse kinematics for undeclared programs.
 METHODS = ("ccd", "fabrik")
 _TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
 
 
 class Restriction(NamedTuple):
-    """An input that a solver does not take, and the greeting that says so."""
+    """An input outside a solver's reach, and its declaration in a greeting."""
 
     input: str  # its name
     greeting: Mapping[str, Any]  # the fields that declare it
@@ -60,7 +60,7 @@ class Restriction(NamedTuple):
         return self.detection == "constant"
 
 
-# Restrictions, each with how answers show it.
+# Restrictions, each with the evidence of answers.
 Evidence = Sequence[tuple[Restriction, Sentence]]
 RESTRICTIONS = tuple(
     Restriction(
@@ -76,7 +76,7 @@ def _first_for_all(name: str, inputs: Mapping[str, Any]) -> Any:
     return np.resize(inputs[name][:1], len(inputs[name]))
 
 
-# What a solver that does not take an input sees in its place, given all inputs.
+# The view of a solver without an input, given all inputs.
 _REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
     "parents": lambda inputs: np.arange(-1, len(inputs["parents"]) - 1),
     "effector": lambda inputs: len(inputs["parents"]) - 1,
@@ -86,15 +86,15 @@ _REPLACEMENTS: Mapping[str, Callable[[Mapping[str, Any]], Any]] = {
     "previous_positions": lambda inputs: inputs["positions"] - inputs["h"] * inputs["velocities"],
     **{name: partial(_first_for_all, name) for name in _SHARED},
 }
-# Inputs that are sent only if the greeting asks for them.
+# Inputs for declared greetings alone.
 _ADDED = ("rest_positions", "previous_positions")
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
     """Return the report by the restrictions of a solver, the same report if none show.
 
-    Of restrictions that make it right the fewest are taken; a solver that is wrong with them too
-    gets both said.
+    The fewest restrictions with a right verdict are taken; a solver with wrong answers beside
+    restrictions gets both said.
     """
     connection = examination.connection
     greeting = connection.greeting
@@ -106,30 +106,30 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
     for restriction in RESTRICTIONS:
         is_tried = restriction.measured or not is_sound
         why = _evidence(connection, report, restriction) if is_tried else None
-        if why is not None and (known := _with_constant(connection, report, restriction)):
-            evidence.append((known, why))
+        if why is not None and (measured := _with_constant(connection, report, restriction)):
+            evidence.append((measured, why))
         elif why is not None:
             unknown.append(restriction)
     if not evidence:
         return _with_unknown(report, unknown)
 
-    def judged(items: Evidence) -> TaskReport:
+    def judge(items: Evidence) -> TaskReport:
         return precision.examine(examination, examination.judge(restricted(greeting, items)))
 
-    best = judged(evidence)
+    best = judge(evidence)
     if best.verdict > Verdict.RIGHT_EXCEPT:
         is_worse = is_sound or _passed(best) < _passed(report)
         best = report if is_worse else _restricted_report(report, best, evidence)
         return _with_unknown(best, unknown)
     for item in [item for item in evidence if not item[0].measured]:
         fewer = [other for other in evidence if other is not item]
-        if fewer and (simpler := judged(fewer)).verdict <= Verdict.RIGHT_EXCEPT:
+        if fewer and (simpler := judge(fewer)).verdict <= Verdict.RIGHT_EXCEPT:
             evidence, best = fewer, simpler
     return _restricted_report(report, best, evidence)
 
 
 def _with_unknown(report: TaskReport, unknown: Sequence[Restriction]) -> TaskReport:
-    """Return the report on wrong answers with inputs that answers ignore for unknown constants."""
+    """Return the report on wrong answers with inputs ignored for unknown constants."""
     if report.verdict < Verdict.WRONG or not unknown:
         return report
     words = sentence(
@@ -147,7 +147,7 @@ def _passed(report: TaskReport) -> float:
 
 
 def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
-    """Return a greeting that declares restrictions as well."""
+    """Return a greeting with declared restrictions as well."""
     fields = {
         name: msgspec.structs.replace(getattr(greeting, name), **field)
         if isinstance(field, dict)
@@ -160,7 +160,7 @@ def restricted(greeting: Greeting, evidence: Evidence) -> Greeting:
 def _with_constant(
     connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Restriction | None:
-    """Return a restriction with the constant in place of its input, None if it does not show."""
+    """Return a restriction with the constant in place of its input, or None."""
     name = restriction.input
     if not restriction.measured:
         return restriction
@@ -176,7 +176,7 @@ def _with_constant(
 
 
 def _fields(evidence: Evidence) -> dict[str, Any]:
-    """Return the fields of a greeting that declare restrictions."""
+    """Return the fields of a greeting for restrictions."""
     fields: dict[str, Any] = {}
     for restriction, _ in evidence:
         for name, field in restriction.greeting.items():
@@ -186,7 +186,7 @@ def _fields(evidence: Evidence) -> dict[str, Any]:
 
 
 def _declaration(evidence: Evidence) -> str:
-    """Return what declares restrictions, with N for a number that answers do not show."""
+    """Return the declaration of restrictions, with N for an unknown number."""
     fields = _fields(evidence)
     for name in (restriction.input for restriction, _ in evidence if restriction.is_assumed):
         fields["fixed"] = {**fields["fixed"], name: "N"}
@@ -218,9 +218,9 @@ def _restricted_report(report: TaskReport, best: TaskReport, evidence: Evidence)
 def _evidence(
     connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
-    """Return how answers show that a solver does not take an input.
+    """Return how answers show an input outside a solver's reach.
 
-    Return None if they do not, or if the greeting declares it.
+    None stands for no such evidence, or a declared restriction.
     """
     greeting, is_tried = connection.greeting, report.task in restriction.tasks
     if restriction.greeting and restricted(greeting, [(restriction, UNRELATED)]) == greeting:
@@ -231,21 +231,21 @@ def _evidence(
 def _constant(
     connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
-    """Return that answers do not depend on an input, None if they do or it is declared."""
+    """Return the sentence on answers independent of an undeclared input, or None."""
     is_undeclared = getattr(connection.greeting.fixed, restriction.input) is None
     is_constant = is_undeclared and is_unread(connection, report, restriction.input)
     return restriction.sentence if is_constant else None
 
 
 def _points(_: Connection, report: TaskReport, restriction: Restriction) -> Sentence | None:
-    """Return that answers to targets are positions alone, None if they are not."""
+    """Return the sentence on answers to targets with positions alone, or None."""
     answers = [j.answer.values for j in report.judgements if isinstance(j.answer, Answer)]
     are_points = bool(answers) and all("local_rotations" not in values for values in answers)
     return restriction.sentence if "target" in _inputs_of(report) and are_points else None
 
 
 def _plane(_: Connection, report: TaskReport, restriction: Restriction) -> Sentence | None:
-    """Return that answers stay in the plane z = 0, or that none come; None if they do not."""
+    """Return the sentence on answers in the plane z = 0, or on absent answers; else None."""
     answers = [(j.case, j.answer.values) for j in report.judgements if isinstance(j.answer, Answer)]
     if not {"offsets", "positions"} & _inputs_of(report):
         return None
@@ -259,7 +259,7 @@ def _inputs_of(report: TaskReport) -> set[str]:
 
 
 def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
-    """Return whether answered vectors have one z or an unchanged z; rotations are about z."""
+    """Return whether answered vectors have a common or unchanged z; rotations are about z."""
     before = case.inputs["positions" if "positions" in case.inputs else "offsets"][:, 2]
     vectors = [np.asarray(x)[..., 2] for x in outputs.values() if np.shape(x)[-1:] == (3,)]
     rotations = [np.asarray(x) for x in outputs.values() if np.shape(x)[-1:] == (4,)]
@@ -272,7 +272,7 @@ def _is_flat(case: Case, outputs: Mapping[str, Any]) -> bool:
 def _unchanged(
     connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
-    """Return how an input does not change answers, None if it does; the other inputs are plain."""
+    """Return how an input leaves answers unchanged, or None; the other inputs are plain."""
     name, names, pairs = restriction.input, _inputs_of(report), []
     if name not in names:
         return None
@@ -296,7 +296,7 @@ def _unchanged(
 def _unread(
     connection: Connection, report: TaskReport, restriction: Restriction
 ) -> Sentence | None:
-    """Return how requests with an input that others lack show that it is not taken, None if not."""
+    """Return how answers to requests with an optional input ignore this input, or None."""
     name = restriction.input
     pairs = [(j.case, j.answer) for j in report.judgements if name in j.case.inputs]
     if len(pairs) in (0, len(report.judgements)):
@@ -326,7 +326,7 @@ def _with_urdf(inputs: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _plain(case: Case, names: set[str]) -> dict[str, Any]:
-    """Return a request without the inputs that some solvers do not take."""
+    """Return a request with inputs as for solvers of all restrictions."""
     inputs = dict(case.inputs)
     for name, replacement in _REPLACEMENTS.items():
         if name in names:
@@ -337,7 +337,7 @@ def _plain(case: Case, names: set[str]) -> dict[str, Any]:
 def _reason(
     plain: Answer | Failure, full: Answer | Failure, restriction: Restriction
 ) -> Sentence | None:
-    """Return how two answers show that an input is not taken."""
+    """Return how two answers show an input outside the solver's reach."""
     if not isinstance(plain, Answer):
         return None
     if not isinstance(full, Answer):
@@ -346,7 +346,7 @@ def _reason(
     return restriction.sentence if _are_same(plain, full) and not is_added else None
 
 
-# What shows a restriction; each returns how, or None if it does not show.
+# Detectors of a restriction; each returns the evidence, or None.
 _DETECTORS: Mapping[str, Callable[[Connection, TaskReport, Restriction], Sentence | None]] = {
     "replaced": _unchanged, "constant": _constant, "absent": _unread, "points": _points,
     "plane": _plane,
@@ -361,10 +361,10 @@ def _are_same(first: Answer, second: Answer) -> bool:
 
 
 def methods_of(connection: Connection, cases: Sequence[Case]) -> tuple[str, ...]:
-    """Return the methods of inverse kinematics that a solver declares, or that its answers show.
+    """Return the declared methods of inverse kinematics, or the methods in a solver's answers.
 
-    Methods show where an answer to one of the cases differs by the request's method, or only comes
-    if it names one.
+    Methods show where the answer to a case differs by the request's method, or only comes with a
+    named method.
     """
     declared = connection.greeting.methods
     for case in cases if declared == ("",) else ():
@@ -373,10 +373,10 @@ def methods_of(connection: Connection, cases: Sequence[Case]) -> tuple[str, ...]
             for method in ("", *METHODS)
         }
         offered = {m: answer for m, answer in answers.items() if isinstance(answer, Answer)}
-        default, named = offered.pop("", None), list(offered.values())
-        if default is None and named:
+        default, method_answers = offered.pop("", None), list(offered.values())
+        if default is None and method_answers:
             return tuple(offered)
-        if len(named) == len(METHODS) and not _are_same(*named):
-            is_either = default and any(_are_same(default, answer) for answer in named)
+        if len(method_answers) == len(METHODS) and not _are_same(*method_answers):
+            is_either = default and any(_are_same(default, answer) for answer in method_answers)
             return METHODS if is_either else declared
     return declared

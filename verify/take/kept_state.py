@@ -14,18 +14,17 @@ from .examination import Examination, is_steady
 
 NAME = "state kept between requests"
 FAULT = tomllib.loads(Path(__file__).with_name("faults.toml").read_text("utf-8"))["state"][NAME]
-# The number of wrong answers that are asked again, the last first.
+# The number of repeated requests with wrong answers, the last first.
 REQUESTS = 4
-# Relative differences of answers above this do not come from threads that add up in another order.
+# Relative differences of answers by threads with another order of sums stay below this.
 SAME = 1e-6
 STEPS = ("mass_spring_step", "mass_spring_motion")
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
-    """Return the report with the fault that answers depend on earlier requests, if they do.
+    """Return the report with the fault of answers by earlier requests, if any.
 
-    Other mistakes that explain such answers do so by chance, except of steps, where a matrix or a
-    state is kept.
+    Other mistakes explain these answers by chance, except steps with a kept matrix or state.
     """
     connection = examination.connection
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
@@ -50,7 +49,7 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
 
 
 def _changed_share(connection: Connection, judgements: Sequence[CaseJudgement]) -> float:
-    """Return the share of answers that differ when asked again, the last answer first."""
+    """Return the share of answers with another repeated answer, the last answer first."""
     connection.close()
     changed = 0
     for judgement in reversed(judgements):

@@ -1,4 +1,4 @@
-"""Infer a solver's precision from its answers: many compute in floats without declaring it."""
+"""Infer a solver's precision from its answers: many compute in undeclared floats."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
@@ -15,12 +15,12 @@ from ..greeting import Greeting
 from ..judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
 from .examination import Examination
 
-# The numbers of an output that suffice, since 99 % of doubles have 15 digits or more; requests with
-# no larger share of such numbers are left out.
+# A sufficient number of an output's numbers, since 99 % of doubles have 15 digits or more. Requests
+# with no larger share of long numbers are left out.
 MIN_NUMBERS, MIN_SHARE = 6, 0.25
-# Answers with fewer digits are compared as they are; answers with more are whole doubles.
+# Answers with fewer digits are compared unchanged; answers with more digits are whole doubles.
 MIN_DIGITS, MAX_DIGITS = 4, 14
-# The digits that single precision is printed with, and those that it leaves correct in most cases.
+# The printed digits of single precision, and the range of its correct digits in most cases.
 SINGLE, CORRECT = (8, 9), (5.0, 9.0)
 # Single precision keeps lengths to about 1e-7, double precision to much less.
 EXACT = 1e-11
@@ -36,7 +36,7 @@ INEXACT = sentence(
 
 
 class RoundedGreeting(Greeting, frozen=True):
-    """A greeting with a number of significant digits that answers have."""
+    """A greeting with the number of significant digits of the answers."""
 
     digits: int = MAX_DIGITS
 
@@ -49,7 +49,7 @@ class RoundedGreeting(Greeting, frozen=True):
 def judging_greeting(
     exchanges: Sequence[Exchange], greeting: Greeting
 ) -> tuple[Greeting, Sentence | None]:
-    """Return the greeting by which to judge answers, and why it differs from the solver's."""
+    """Return the greeting by which to judge answers, and why the solver's own is not used."""
     outputs = [numbers for numbers in _outputs(exchanges).values() if len(numbers) >= MIN_NUMBERS]
     greetings = [_greeting_of(numbers, greeting) for numbers in outputs]
     return max(greetings, key=lambda pair: pair[0].epsilon, default=(greeting, None))
@@ -86,15 +86,15 @@ def _digits(numbers: np.ndarray) -> int:
 
 
 def _decimals(numbers: np.ndarray) -> list[DecimalTuple]:
-    """Return the fewest digits that distinguish each number from other doubles."""
+    """Return the fewest digits of each number for the same double."""
     return [Decimal(repr(x)).normalize().as_tuple() for x in numbers.tolist()]
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
-    """Return the report on wrong answers as rounded ones, or judged in single precision.
+    """Return the report on wrong answers as rounded answers, or judged in single precision.
 
-    They are so judged if that makes them right, or if the answers made right have errors
-    of single precision: the other answers are wrong in single precision too.
+    Single precision has to make all answers right, or to excuse answers with errors of single
+    precision. The other answers are wrong in single precision too.
     """
     greeting = report.greeting
     if report.verdict is not Verdict.WRONG or greeting is None:
@@ -123,14 +123,14 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
 
 
 def decimal_places(exchanges: Sequence[Exchange]) -> int | None:
-    """Return the few decimals that all answers are rounded to, None if they have more."""
+    """Return the few decimals of all answers if rounded, else None."""
     numbers = np.concatenate([*_outputs(exchanges).values(), ()])
     places = max((-int(decimal.exponent) for decimal in _decimals(numbers)), default=MIN_DIGITS)
     return places if len(numbers) >= MIN_NUMBERS and places < MIN_DIGITS else None
 
 
 def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
-    """Return the numbers of each output that do not come from the request, residuals aside."""
+    """Return the numbers of each output beyond the request's, residuals aside."""
     outputs: dict[str, np.ndarray] = {}
     for exchange in exchanges:
         inputs = _long_numbers(exchange.case.inputs.values())
@@ -144,14 +144,14 @@ def _outputs(exchanges: Sequence[Exchange]) -> dict[str, np.ndarray]:
 
 
 def _long_numbers(arrays: Iterable[Any]) -> np.ndarray:
-    """Return the finite numbers that need more than 12 bits: not 0, 1 or a half."""
+    """Return the finite numbers of more than 12 bits: not 0, 1 or a half."""
     numbers = np.concatenate([np.ravel(array) for array in arrays if not isinstance(array, str)])
     numbers = numbers[np.isfinite(numbers)].astype(float)
     return numbers[2.0**12 * np.frexp(numbers)[0] % 1.0 != 0.0]
 
 
 def _is_exact(report: TaskReport) -> bool:
-    """Return whether lengths are kept as only double precision keeps them, in most answers."""
+    """Return whether most answers keep lengths as only double precision does."""
     errors = [
         finding.error
         for judgement in report.judgements

@@ -13,15 +13,15 @@ from ..gaps import largest_gap
 from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from .examination import TRIALS, Examination, is_steady, outputs_of
 
-# Inputs of springs that may be zero.
+# Inputs of springs with possible zeros.
 NAMES = ("stiffnesses", "dampings")
-# Almost zero. Right answers change by about this share of what 1 in its place changes, other ones
-# by as much as another number does.
+# Almost zero. The change of right answers is about this share of the change by 1 in its place.
+# Other answers change as by another number.
 ALMOST, JUMP = 1e-6, 1e-2
 
 
 def examine(examination: Examination, report: TaskReport) -> TaskReport:
-    """Return the report on wrong answers that are right with almost zero in the place of zero."""
+    """Return the report on wrong answers, right with almost zero in the place of zero."""
     wrong = [j for j in report.judgements if j.verdict >= Verdict.UNDECIDED]
     if report.verdict < Verdict.UNDECIDED or report.original is not None:
         return report
@@ -52,7 +52,7 @@ def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
 
 
 def _jumps(connection: Connection, judgements: Sequence[CaseJudgement], name: str) -> bool:
-    """Return whether answers with zeros differ from those with almost zeros, wherever it tells."""
+    """Return whether answers with zeros differ from answers with almost zeros."""
     count = 0
     for judgement in judgements:
         values = np.asarray(judgement.case.inputs[name])

@@ -1,4 +1,4 @@
-"""Starters in seven languages that speak the protocol and lack only the user's code."""
+"""Starters in seven languages, with the protocol and a place for the user's code."""
 
 import re
 import tomllib

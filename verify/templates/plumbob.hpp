@@ -207,6 +207,12 @@ class Request {
 
     bool has(const std::string& name) const { return members.count(name) > 0; }
 
+    // A text that a request may lack, then empty.
+    std::string text(const std::string& name) const {
+        auto found = members.find(name);
+        return found == members.end() ? "" : found->second.text;
+    }
+
     // A field becomes what it is given to: double h = in["h"], or h = in["h"]; null is NaN.
     struct Field {
         const Value& value;

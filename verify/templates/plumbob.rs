@@ -252,7 +252,7 @@ impl Request {
             effector: self.get("effector")?,
             tool_position: self.get("tool_position")?,
             tool_rotation: self.get("tool_rotation")?,
-            urdf: self.get("urdf")?,
+            urdf: self.get("urdf").unwrap_or_default(), // optional
         })
     }
 }

@@ -66,7 +66,7 @@ void robot_jacobian(const Robot& robot, const std::vector<double>& q,
 void solve_robot(const plumbob::Request& in, plumbob::Answer& out) {
     Robot robot{in["parents"], in["origins"], in["orientations"], in["axes"], in["slides"],
                 in["lower"], in["upper"], in["effector"], in["tool_position"],
-                in["tool_rotation"], in["urdf"]};
+                in["tool_rotation"], in.text("urdf")};
     if (in.task == "robot_jacobian") {
         std::vector<double> q = in["q"];
         std::vector<std::vector<double>> jacobian(6, std::vector<double>(q.size()));
