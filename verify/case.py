@@ -9,7 +9,7 @@ import numpy as np
 from plumbob.text.sentence import Sentence
 
 # The answer that a case needs. "must" is a right answer, "may" an answer or a failure, since
-# textbooks divide by zero there; "implementation-defined" is any answer within the laws, or a failure.
+# textbooks divide by zero there; "implementation-defined" is any answer by the laws, or a failure.
 Requirement = Literal["must", "may", "implementation-defined"]
 
 

@@ -6,26 +6,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from small_discipline import own_rotation, use_small_disciplines
 
 from plumbob.verify.connections.command import CaseOptions
-from plumbob.verify.fault_programs import coded_faults, connection_to
+from plumbob.verify.functions import FunctionConnection
+from plumbob.verify.greeting import Greeting
 from plumbob.verify.screen import files, json_file, terminal
 from plumbob.verify.screen.files import Files
 from plumbob.verify.screen.words import Presentation, speaker
 from plumbob.verify.verify import verify
 
 
-@pytest.fixture(scope="module")
-def judged():
-    (fault,) = (one for one in coded_faults().values() if one.name == "gravity g/m")
-    return verify(connection_to(fault.wrong_program))
-
-
 @pytest.fixture
-def report(judged, monkeypatch, tmp_path):
+def report(monkeypatch, tmp_path):
+    """A report on a wrong solver of a small discipline, in a folder of its own."""
+    use_small_disciplines(monkeypatch)
     monkeypatch.chdir(tmp_path)
     Path("out").mkdir()
-    return judged
+    task = "forward_kinematics"
+    return verify(FunctionConnection({task: own_rotation}, Greeting(1, (task,))))
 
 
 def raises(*_):
@@ -40,7 +39,7 @@ def test_a_failing_writer_costs_no_verdict(writer, report, monkeypatch, capsys):
     code = Files(None, None, None, Path("out")).write(report, CaseOptions(), context)
     out, err = capsys.readouterr()
     assert code == 1  # a mistake of ours in a file leaves the exit code to the verdict
-    assert "mass_spring_forces" in out
+    assert "forward_kinematics" in out
     assert err.startswith("plumbob: out/")
     assert err.count("\n") == 1
     assert "TypeError: Encoding objects of type sphinx" in err
@@ -57,7 +56,7 @@ def test_a_case_that_cannot_be_saved_costs_no_verdict(report, capsys):
     )
     out, err = capsys.readouterr()
     assert code == 2
-    assert "Gravity is divided by the mass" in out
+    assert "Its own rotation is applied" in out
     assert "--rerun" not in out
     assert err == "plumbob: plumbob_failures could not be written: File exists\n"
 
