@@ -20,15 +20,12 @@ from .predictions import solve
 from .sweeps import PoseTrial
 
 KEY, SQUARED = "early by another test", "tolerance against the squared distance"
-BETWEEN = "measured between the passes"
-EARLY_ENDS = {KEY, SQUARED, BETWEEN}
+EARLY_ENDS = {KEY, SQUARED}
 # So many solves end early, at least, if squared distances end them.
 LEAST_EARLY = 3
 # A pose is that after a sweep up to this share of the skeleton's size, by precision, or if it is
 # so many times nearer to it than to that after any other: sweeps enlarge rounding.
 SAME_POSE, NEARER = {"double": 1e-7, "single": 1e-5}, 30.0
-# The words of the test whose mistake has a code of its own.
-OF_SQUARES = sentence("the square of the distance to the target is below the tolerance")
 
 
 class FollowedSolve(NamedTuple):
@@ -53,7 +50,11 @@ TESTS: Sequence[tuple[Quantity, float | None, Sentence]] = (
         None,
         sentence("the number of sweeps is {sweeps}, whatever max_iterations is"),
     ),
-    (lambda s: s.distances**2 / s.tolerance, 1.0, OF_SQUARES),
+    (
+        lambda s: s.distances**2 / s.tolerance,
+        1.0,
+        sentence("the square of the distance to the target is below the tolerance"),
+    ),
     (
         lambda s: s.distances,
         None,
@@ -92,12 +93,7 @@ def explanation(
     if not ended:
         return None
     early = [solve for solve in ended if solve.is_early]
-    is_single = len(early) > 1 and all(len(solve.distances) == 2 for solve in early)
-    if method == "fabrik" and is_single:  # after one sweep
-        return Explanation((BETWEEN,), sentences_of("fabrik")[BETWEEN], 1.0, 0.0)
     test = ending_test(TESTS, ended, [solve.is_early for solve in ended])
-    if test is not None and test.template == OF_SQUARES.template:
-        return Explanation((SQUARED,), sentences_of("stop")[SQUARED], 1.0, 0.0)
     is_count = test is not None and test.template == TESTS[0][2].template
     if test is None or (is_count and greeting.fixed.max_iterations is not None):
         return None  # a solver with its own number of sweeps ends by no test

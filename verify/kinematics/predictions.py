@@ -7,11 +7,14 @@ import numpy as np
 
 from plumbob.reference import rotation
 from plumbob.reference.arguments import FloatArray, IndexArray
+from plumbob.reference.backend.compiled import Kernel
+from plumbob.reference.kinematics import forward_pose
 
 from ..case import Case
-from .textbook import SOLVERS, Choices, Ending, TextbookChain, TextbookPose, place_all
+from .textbook import SOLVERS, Choices, Ending, TextbookChain, TextbookPose
 
 TEXTBOOK = Choices()
+PLACE = Kernel(forward_pose, label="forward kinematics of the judge")
 
 
 def path_to(parents: IndexArray, effector: int) -> IndexArray:
@@ -25,7 +28,7 @@ def path_to(parents: IndexArray, effector: int) -> IndexArray:
 def forward(inputs: Mapping[str, Any]) -> tuple[FloatArray, FloatArray]:
     """Return positions and global rotations of all joints."""
     pose = _start(inputs)
-    place_all(TextbookChain(inputs["parents"], inputs["offsets"], np.zeros(0, np.int64)), pose)
+    PLACE(inputs["parents"], inputs["offsets"], *pose)
     return pose.positions, pose.rotations
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray, IndexArray
 from plumbob.reference.backend.compiled import Kernel, bind
+from plumbob.reference.kinematics import forward_pose
 from plumbob.reference.quaternion import (
     IDENTITY,
     add,
@@ -68,15 +69,7 @@ class Ending(NamedTuple):
 
 def place(chain: TextbookChain, pose: TextbookPose) -> None:
     """Fill positions and global rotations of all joints."""
-    for j in range(len(chain.parents)):
-        p = chain.parents[j]
-        x, R = load_vector(chain.offsets, j), load_quaternion(pose.local, j)
-        if p >= 0:
-            P = load_quaternion(pose.rotations, p)
-            x = add(load_vector(pose.positions, p), rotate(P, x))
-            R = multiply(P, R)
-        store_vector(pose.positions, j, x)
-        store_quaternion(pose.rotations, j, R)
+    forward_pose(chain.parents, chain.offsets, pose.local, pose.positions, pose.rotations)
 
 
 def solve(
@@ -196,7 +189,6 @@ class Method(NamedTuple):
 
 method = Method(sweep_ccd, leave)
 FABRIK = Method(sweep_fabrik, follow)
-place_all = Kernel(place, label="forward kinematics of the textbook")
 SOLVERS = {
     "ccd": Kernel(solve, label="CCD of the textbook"),
     "fabrik": Kernel(bind(solve, method=FABRIK), label="FABRIK of the textbook"),

@@ -120,14 +120,27 @@ class ForwardPose:
         self.above = _of_parents(self.rotations, self.parents, IDENTITY)
 
     @property
+    def links(self) -> FloatArray:
+        """The answered vectors from each joint's parent to the joint [m]."""
+        return self.positions - _of_parents(self.positions, self.parents, 0.0)
+
+    @property
+    def gaps(self) -> FloatArray:
+        """How far joints are from where the answer for their parent puts them, over the size."""
+        due = rotation.rotate(self.above, self.offsets)
+        return np.abs(self.links - due).max(axis=1) / _size(self.offsets)
+
+    @property
+    def turns(self) -> FloatArray:
+        """By what angle joints differ from what follows from the answer for their parent [rad]."""
+        return angles(self.raw, rotation.multiply(self.above, self.local))
+
+    @property
     def wrong(self) -> BoolArray:
         """Which joints do not have the pose that follows from the answer for their parent."""
         if self.positions is None or self.raw is None:
             return np.zeros(len(self.parents), dtype=bool)
-        links = self.positions - _of_parents(self.positions, self.parents, 0.0)
-        gaps = np.abs(links - rotation.rotate(self.above, self.offsets)).max(axis=1)
-        turns = angles(self.raw, rotation.multiply(self.above, self.local))
-        return ~(np.maximum(gaps / _size(self.offsets), turns) <= BETWEEN * TOLERANCE)
+        return ~(np.maximum(self.gaps, self.turns) <= BETWEEN * TOLERANCE)
 
     def carriers(self, joint: int) -> IndexArray:
         """Return the joints from whose answered pose that of a joint follows."""
@@ -143,16 +156,13 @@ def _add_forward(
 ) -> None:
     features, local, offsets = joint_features(pose.inputs), pose.local, pose.offsets
     if pose.raw is not None:
-        due = rotation.multiply(pose.above, local)
         is_rotated = np.abs(local[:, 1:]).max(axis=1) > UNROTATED
-        tables["rotation"].add(pose.name, angles(pose.raw, due), features, is_counted=is_rotated)
+        tables["rotation"].add(pose.name, pose.turns, features, is_counted=is_rotated)
         _add_products(pose, pose.raw, equalities)
     if pose.positions is not None:
-        links = pose.positions - _of_parents(pose.positions, pose.parents, 0.0)
-        gaps = np.abs(links - rotation.rotate(pose.above, offsets)).max(axis=1) / _size(offsets)
         is_long = np.any(offsets, axis=1)
-        tables["position"].add(pose.name, gaps, features, is_counted=is_long)
-        _add_frames(pose, links, equalities)
+        tables["position"].add(pose.name, pose.gaps, features, is_counted=is_long)
+        _add_frames(pose, pose.links, equalities)
 
 
 def _add_products(pose: ForwardPose, raw: FloatArray, equalities: Equalities) -> None:
