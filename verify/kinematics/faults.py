@@ -3,10 +3,9 @@
 import tomllib
 from pathlib import Path
 
-from plumbob.text.sentence import Sentence, sentence, with_code
+from plumbob.text.sentence import Sentence, with_code
 
 TABLE = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
-AS_THE_TEXTBOOK = sentence("It does what the textbook does.")
 
 
 def sentences_of(part: str) -> dict[str, Sentence]:
