@@ -1,6 +1,5 @@
 """What wrong answers show is true, names the mistake, and is silent where nothing is wrong."""
 
-import random
 import sys
 from dataclasses import replace
 from types import SimpleNamespace
@@ -23,7 +22,6 @@ from plumbob.verify.mass_spring.problem import all_forces, problem_of
 from plumbob.verify.observe import (
     fits,
     inputs,
-    joints,
     observations,
     separation,
     springs,
@@ -188,37 +186,6 @@ def test_right_program_is_told_nothing_even_if_all_its_answers_count_as_wrong(
 # The rules against false sentences
 
 
-def tables_of_trees(count, seed):
-    """Return tables of joints with random features, of which each is wrong at a kind of joint."""
-    rng = np.random.default_rng(seed)
-    kinds = ("root", "leaf", "child_of_root", "branching", "last_joint")
-    for k in range(count):
-        table, kind = ElementTable("rotation"), kinds[k % len(kinds)]
-        for case in range(20):
-            joints_ = int(rng.integers(2, 9))
-            parents = np.array([-1, *(int(rng.integers(0, j)) for j in range(1, joints_))])
-            features = joints.joint_features({
-                "parents": parents,
-                "offsets": rng.standard_normal((joints_, 3)),
-                "local_rotations": rotation.random(rng, joints_),
-            })  # fmt: skip
-            table.add(f"case {case}", features[kind].astype(float), features)
-        yield table
-
-
-def shuffled(table, rng):
-    """Return a table with the labels shuffled within each case."""
-    copy = ElementTable("rotation")
-    for name in {element.case: None for element in table.elements}:
-        elements = [element for element in table.elements if element.case == name]
-        labels = [element.is_wrong for element in elements]
-        rng.shuffle(labels)
-        copy.elements += [
-            e._replace(is_wrong=label) for e, label in zip(elements, labels, strict=True)
-        ]
-    return copy
-
-
 def half_forces(masses, springs, rest_lengths, stiffnesses, pinned, gravity, positions,
                 velocities, h, **_):  # fmt: skip
     """One linearised step with half of the springs' forces, and a quarter of a term of K."""
@@ -258,13 +225,6 @@ def test_requests_without_an_answer_are_left_out_and_a_crash_ends_them():
 
     assert answered(FailureKind.RAISED) == 4
     assert answered(FailureKind.CRASHED) == 0
-
-
-def test_separations_are_found_and_shuffled_labels_show_none():
-    tables, rng = list(tables_of_trees(60, 1)), random.Random(1)
-    assert all(separation.separation(table).is_exact for table in tables)
-    noise = [shuffled(table, rng) for table in tables for _ in range(7)]
-    assert not any(map(separation.separation, noise))
 
 
 def table(*cases, **of_all):
@@ -372,20 +332,6 @@ def test_statements_on_one_sweep_need_max_iterations_to_be_read():
         )
     assert "in one sweep of CCD" in read
     assert "in one sweep of CCD" not in unread
-
-
-def test_inputs_count_only_if_right_answers_change(monkeypatch):
-    connection = connection_to(textbook(INVERSE), INVERSE, "ccd")
-    cases = DISCIPLINES[INVERSE].cases(connection.greeting, "ccd", 0, False)
-    arguments = connection, cases, connection.greeting, "ccd"
-    assert inputs.unread_inputs(*arguments) == []
-    monkeypatch.setattr(inputs, "TIGHT", 0.0)
-    monkeypatch.setattr(inputs, "SWEEPS", 1)
-    monkeypatch.setattr(inputs, "FEW_SWEEPS", 1)
-    assert inputs.unread_inputs(*arguments) == []  # one sweep, which no tolerance ends
-    monkeypatch.setattr(inputs, "DIFFERENT", -1.0)
-    monkeypatch.setattr(inputs, "_arrives", lambda case, answer: True)
-    assert "tolerance" in inputs.unread_inputs(*arguments)
 
 
 def test_plainest_sum_is_chosen_and_nearly_right_ones_are_right():
