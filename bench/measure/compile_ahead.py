@@ -4,6 +4,7 @@ Compiled kernels are stored on disk for later calls. Run as a module, this file 
 """
 
 import contextlib
+import functools
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -28,31 +29,21 @@ def compile_kernels() -> None:
     """Solve a small problem with each solver, the slowest to compile and last needed first."""
     import numpy as np
 
-    from plumbob.reference import (
-        IK_SOLVERS,
-        STEP_SOLVERS,
-        Articulation,
-        ImplicitEuler,
-        Skeleton,
-        Target,
-        curves,
-        scenes,
-        solve_ik,
-        track,
-    )
+    from plumbob import reference
 
-    cloth, state = scenes.lab_cloth(damping=0.2)
-    for name in STEP_SOLVERS:
-        ImplicitEuler(cloth, h=1 / 60, solver=name, max_iterations=2).step(state)
-    links = Skeleton([-1, 0, 1, 2], [[0, 0, 0.3], [0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0]])
+    cloth, state = reference.scenes.lab_cloth(damping=0.2)
+    for name in reference.STEP_SOLVERS:
+        reference.ImplicitEuler(cloth, h=1 / 60, solver=name, max_iterations=2).step(state)
+    links = reference.Skeleton([-1, 0, 1, 2], [[0, 0, 0.3], [0, 0, 0.4], [0.4, 0, 0], [0.3, 0, 0]])
     axes = [[0, 0, 1], [0, 1, 0], [0, 1, 0], [1, 0, 0]]
-    robot = Articulation(links, "hinge", axes=axes, lower=-2.5, upper=2.5)
-    arm, rest = scenes.lab_arm()
+    robot = reference.Articulation(links, "hinge", axes=axes, lower=-2.5, upper=2.5)
+    arm, rest = reference.scenes.lab_arm()
     target = np.array([0.4, 0.2, 0.5])
-    for name in IK_SOLVERS:
-        solve_ik(robot, robot.neutral(), Target(target), solver=name, max_iterations=2)
-        solve_ik(arm, rest, target, solver=name, max_iterations=2)
-    track(arm, curves["heart"]())
+    for name in reference.IK_SOLVERS:
+        solve = functools.partial(reference.solve_ik, solver=name, max_iterations=2)
+        solve(robot, robot.neutral(), reference.Target(target))
+        solve(arm, rest, target)
+    reference.track(arm, reference.curves["heart"]())
 
 
 if __name__ == "__main__":

@@ -1,5 +1,7 @@
 """A user's solver for cloths: each step of a frame is a request."""
 
+from typing import Any
+
 import numpy as np
 
 from plumbob.reference import MassSpring, State
@@ -11,6 +13,24 @@ from .protocol import Mover, OwnTime, total
 from .user_solver import MOTION_TASK, STEP_TASK, Spec
 
 _PARTS = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
+
+
+def system_inputs(system: MassSpring, h: float, greeting: Greeting) -> dict[str, Any]:
+    """Return the part of a request that is the same in each step: the system and the step [s]."""
+    inputs: dict[str, Any] = {name: getattr(system, name) for name in _PARTS} | {"h": h}
+    if greeting.system.external_forces:
+        inputs["external_forces"] = np.zeros((system.particle_count, 3))
+    if greeting.system.tension_only:
+        inputs["tension_only"] = system.tension_only
+    return inputs
+
+
+def state_inputs(x: FloatArray, v: FloatArray, h: float, greeting: Greeting) -> dict[str, Any]:
+    """Return the part of a request that changes: positions [m] and velocities [m/s]."""
+    state = {"positions": x, "velocities": v}
+    if greeting.system.state == "previous_positions":
+        state["previous_positions"] = x - h * v
+    return state
 
 
 def prepare(system: MassSpring, frame: float, spec: Spec = "", substeps: int = 1) -> Mover:
@@ -30,14 +50,9 @@ class _Requests:
         greeting = self._solver.greeting
         _check_model(system, greeting)
         self._task = STEP_TASK if STEP_TASK in greeting.tasks else MOTION_TASK
-        self._inputs = {name: getattr(system, name) for name in _PARTS} | {"h": h}
-        if greeting.system.external_forces:
-            self._inputs["external_forces"] = np.zeros((system.particle_count, 3))
-        if greeting.system.tension_only:
-            self._inputs["tension_only"] = system.tension_only
+        self._inputs = system_inputs(system, h, greeting)
         if self._task == MOTION_TASK:
             self._inputs["steps"] = 1
-        self._has_previous = greeting.system.state == "previous_positions"
 
     def begin(self, state: State) -> None:
         self._x, self._v = state.positions, state.velocities
@@ -50,10 +65,8 @@ class _Requests:
         return self._x
 
     def _step(self) -> OwnTime:
-        inputs = {**self._inputs, "positions": self._x, "velocities": self._v}
-        if self._has_previous:
-            inputs["previous_positions"] = self._x - self._h * self._v
-        answer, time = self._solver.answer(self._task, inputs)
+        state = state_inputs(self._x, self._v, self._h, self._solver.greeting)
+        answer, time = self._solver.answer(self._task, self._inputs | state)
         if self._task == MOTION_TASK:
             answer = {name: frames[-1] for name, frames in answer.items()}
         x = answer.get("positions")

@@ -13,11 +13,12 @@ from plumbob.verify.case import Case
 from plumbob.verify.connections import open_connection
 from plumbob.verify.exchange import Connection, Failure, NoGreetingError
 
-TRACK, REACH = "track", "inverse_kinematics"
-STEP, MOTION = "mass_spring_step", "mass_spring_motion"
+from ..peers.user_cloth import state_inputs, system_inputs
+from ..peers.user_solver import CHAIN_TASK, MOTION_TASK, STEP_TASK
+
+TRACK = "track"
 # The tasks for scenes: a scene needs any of these.
-ARM_TASKS, CLOTH_TASKS = (TRACK, REACH), (STEP, MOTION)
-SYSTEM = ("masses", "springs", "rest_lengths", "stiffnesses", "dampings", "pinned", "gravity")
+ARM_TASKS, CLOTH_TASKS = (TRACK, CHAIN_TASK), (STEP_TASK, MOTION_TASK)
 TOLERANCE, MAX_ITERATIONS = 1e-4, 100  # the defaults of `solve_ik`
 # The step of a cloth [s].
 H = 1 / 60
@@ -102,7 +103,7 @@ class SceneSolver:
         frames = []
         for i, target in enumerate(curve):
             request = f"frame {i + 1} of {len(curve)}"
-            answer = self._answer(REACH, {**inputs, "target": target}, request)
+            answer = self._answer(CHAIN_TASK, {**inputs, "target": target}, request)
             frames.append(_joint_positions(skeleton, answer))
             if "local_rotations" in answer:  # each frame starts from the one before
                 inputs["local_rotations"] = answer["local_rotations"]
@@ -116,24 +117,19 @@ class SceneSolver:
 
         Positions are NaN from the first step with a non-finite position.
         """
-        fields = self._greeting.system
-        inputs: dict[str, Any] = {name: getattr(system, name) for name in SYSTEM} | {"h": H}
-        if fields.tension_only:
-            inputs["tension_only"] = system.tension_only
-        if fields.external_forces:
-            inputs["external_forces"] = np.zeros_like(start.positions)
-        if fields.rest_lengths == "measured":
+        inputs = system_inputs(system, H, self._greeting)
+        if self._greeting.system.rest_lengths == "measured":
             inputs["rest_positions"] = start.positions
         x, v = start.positions, start.velocities
-        if self.offered("a cloth", CLOTH_TASKS) == MOTION:
-            request = {**inputs, "steps": steps, **self._state(x, v)}
-            answer = self._answer(MOTION, request, "the motion")
+        if self.offered("a cloth", CLOTH_TASKS) == MOTION_TASK:
+            request = {**inputs, "steps": steps, **state_inputs(x, v, H, self._greeting)}
+            answer = self._answer(MOTION_TASK, request, "the motion")
             return np.array([x, *_array(answer, "positions")])
         frames = np.full((steps + 1, *x.shape), np.nan)
         frames[0] = x
         for i in range(steps):
-            request = inputs | self._state(x, v)
-            answer = self._answer(STEP, request, f"step {i + 1} of {steps}")
+            request = inputs | state_inputs(x, v, H, self._greeting)
+            answer = self._answer(STEP_TASK, request, f"step {i + 1} of {steps}")
             positions = _array(answer, "positions")
             x, v = positions, answer.get("velocities", (positions - x) / H)
             if not np.isfinite(x).all():
@@ -141,12 +137,6 @@ class SceneSolver:
             frames[i + 1] = x
             progress(i + 1, steps)
         return frames
-
-    def _state(self, x: FloatArray, v: FloatArray) -> dict[str, FloatArray]:
-        state = {"positions": x, "velocities": v}
-        if self._greeting.system.state == "previous_positions":
-            state["previous_positions"] = x - H * v
-        return state
 
     def _answer(self, task: str, inputs: dict[str, Any], request: str) -> dict[str, Any]:
         """Return the answer to a request, which error messages name."""

@@ -91,21 +91,20 @@ class FittingContext(_Context):  # type: ignore[misc]
     formatter_class = FittingFormatter
 
 
-class Command(TyperCommand):
+class _Fitting:
+    """Help fitted to the terminal."""
+
+    context_class: Any = FittingContext
+
+    def get_short_help_str(self, limit: int = 0) -> str:
+        """Return the first sentence of the help, whatever its length."""
+        text: str = super().get_short_help_str(1000)  # type: ignore[misc]
+        return text
+
+
+class Command(_Fitting, TyperCommand):
     """A command with help fitted to the terminal."""
 
-    context_class = FittingContext
 
-    def get_short_help_str(self, limit: int = 0) -> str:
-        """Return the first sentence of the help, whatever its length."""
-        return super().get_short_help_str(1000)
-
-
-class FittingGroup(TyperGroup):
+class FittingGroup(_Fitting, TyperGroup):
     """A group of commands with help fitted to the terminal."""
-
-    context_class = FittingContext
-
-    def get_short_help_str(self, limit: int = 0) -> str:
-        """Return the first sentence of the help, whatever its length."""
-        return super().get_short_help_str(1000)

@@ -25,8 +25,6 @@ NOT_INSTALLED = "not installed"
 # Names of problems or solvers in the list of all suites, and their lines.
 _MAX_NAMES, _MAX_LINES = 6, 2
 _PACKAGES = {catalogue.PLUMBOB: "plumbob", catalogue.PINOCCHIO: "pin", catalogue.MUJOCO: "mujoco"}
-OWN_RECORD, OTHER_RECORDS, BUDGET = "its own record", "records of others", "budgets"
-UNKNOWN = "unknown"
 
 
 def listed(suites: Sequence[str], choice: Choice) -> Iterator[str]:
@@ -126,12 +124,11 @@ def _in_short(noun: str, names: Iterable[str]) -> Iterator[str]:
 
 
 class PlannedBlock(NamedTuple):
-    """A block to be measured, the reason if again, its time [s], and the source of the time."""
+    """A block to be measured, the reason if again, and its time [s], 0 if unknown."""
 
     block: Block
     reason: str
     seconds: float
-    source: str
 
 
 def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
@@ -141,7 +138,7 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
     selection = [block for block in every if not _measures(block, not_installed, not_asked)]
     reasons = [run.why_again(block, present, THIS_PROCESS) for block in selection]
     steps = [
-        PlannedBlock(block, reason, *_estimate(block, present))
+        PlannedBlock(block, reason, _estimate(block, present))
         for block, reason in zip(selection, reasons, strict=True)
         if reason is not None
     ]
@@ -151,22 +148,21 @@ def dry_run(suites: Sequence[str], choice: Choice, folder: Path) -> list[str]:
         repeats = Counter(step.reason for step in group if step.reason)
         whys = "".join(f"; again {count:,}, for {reason}" for reason, count in repeats.items())
         lines.append(f"  {suite}: {solver}: {len(group):,}, {_time(group)}{whys}")
-    return [*lines, _total(steps)]
+    total = f"Total: {_time(steps)}, without compilation"
+    return [*lines, total if steps else "Nothing would be measured"]
 
 
-def _estimate(block: Block, present: Mapping[Key, Record]) -> tuple[float, str]:
-    """Return the expected seconds of a block, and the source of the estimate."""
+def _estimate(block: Block, present: Mapping[Key, Record]) -> float:
+    """Return the expected seconds by a block's record, by other solvers, or by its budget."""
     own = present.get(block_key(block))
     if own is not None and own.seconds > 0.0 and not own.failed:
-        return _scaled_time(own, block), OWN_RECORD
+        return _scaled_time(own, block)
     times = [
         _scaled_time(record, block)
         for record in present.values()
         if (record.suite, record.problem) == (block.suite, block.problem) and record.seconds > 0.0
     ]
-    if times:
-        return median(times), OTHER_RECORDS
-    return block.budget, BUDGET if block.budget else UNKNOWN
+    return median(times) if times else block.budget
 
 
 def _scaled_time(record: Record, block: Block) -> float:
@@ -174,17 +170,9 @@ def _scaled_time(record: Record, block: Block) -> float:
     return record.seconds * (block.size / record.size if block.size and record.size else 1.0)
 
 
-def _total(steps: Sequence[PlannedBlock]) -> str:
-    if not steps:
-        return "Nothing would be measured"
-    sources = Counter(step.source for step in steps if step.source != UNKNOWN)
-    listed = ", ".join(f"{count} from {source}" for source, count in sources.items())
-    return f"Total: {_time(steps)}{f' ({listed})' if listed else ''}, without compilation"
-
-
 def _time(steps: Sequence[PlannedBlock]) -> str:
     """Return the expected time as words: "about 12 s", "time unknown"."""
-    times = [step.seconds for step in steps if step.source != UNKNOWN]
+    times = [step.seconds for step in steps if step.seconds]
     if not times:
         return "time unknown"
     unknown = len(steps) - len(times)

@@ -135,9 +135,7 @@ def progress() -> Any:
 
     class TimeLeft(ProgressColumn):
         def render(self, task: Any) -> Text:
-            if task.total is None:
-                return Text(f"{task.elapsed or 0.0:.0f} s")
-            return Text(time_left(task.elapsed, task.completed, task.total, task.fields))
+            return Text(_time_of(task))
 
     console = Console(stderr=True)
     rigid = Column(no_wrap=True)
@@ -180,21 +178,26 @@ def lines_in_a_pipe(bar: Any, pauses: tuple[float, float] | None = None) -> Iter
 
 def _progress_line(task: Any) -> str:
     """Return the state of a bar's task: its progress, the time left, and its description."""
+    count = "" if task.total is None else f"{task.completed:g}/{task.total:g}, "
+    return f"{count}{_time_of(task)}: {task.description}"
+
+
+def _time_of(task: Any) -> str:
+    """Return the time left of a bar's task, or the time so far if its end is unknown."""
     if task.total is None:
-        return f"{task.elapsed or 0.0:.0f} s: {task.description}"
-    left = time_left(task.elapsed, task.completed, task.total, task.fields)
-    return f"{task.completed:g}/{task.total:g}, {left}: {task.description}"
+        return f"{task.elapsed or 0.0:.0f} s"
+    return time_left(task.elapsed, task.completed, task.total, task.fields)
 
 
 def time_left(
-    elapsed: float | None, completed: float, total: float | None, fields: Mapping[str, Any]
+    elapsed: float | None, completed: float, total: float, fields: Mapping[str, Any]
 ) -> str:
     """Return the remaining time at the average pace so far: "1:05 left".
 
     "? left" before a hundredth is complete, since the first calls compile.
     """
     steps = completed - fields.get("kept", 0)
-    if not elapsed or total is None or steps <= 0.01 * total:
+    if not elapsed or steps <= 0.01 * total:
         return "? left"
     minutes, seconds = divmod(round(elapsed / steps * (total - completed)), 60)
     hours, minutes = divmod(minutes, 60)
