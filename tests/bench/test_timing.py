@@ -38,6 +38,11 @@ from plumbob.reference.formats import mjcf, urdf
 WORK = TimedWork("p", "s", "g", "t")
 
 
+def in_this_process(patience, function, *arguments):
+    """The result of a function without a process of its own: `test_isolation` has those."""
+    return function(*arguments)
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """The folder of the records of a run that times a few cases for a millisecond."""
@@ -45,6 +50,7 @@ def folder(tmp_path_factory):
     few.setitem(run.SCALES, "quick", Scale(1, 0.001))
     some = [c for c in cases() if (c.solver, c.work.group) == (COMPILED, "10 balls")]
     few.setattr(measurement, "cases", lambda: some)
+    few.setattr(measurement, "in_a_fresh_process", in_this_process)
     try:
         events = list(run.run(["timing"], "quick", folder))
     finally:
@@ -80,8 +86,7 @@ def compared(monkeypatch):
     made = [TimedCase(WORK, name, lambda name=name: lambda: called.append(name)) for name in "ab"]
     made.append(TimedCase(WORK, "c", fails))
     monkeypatch.setattr(measurement, "cases", lambda: tuple(made))
-    here = lambda patience, function, *arguments: function(*arguments)  # noqa: E731
-    monkeypatch.setattr(measurement, "in_a_fresh_process", here)
+    monkeypatch.setattr(measurement, "in_a_fresh_process", in_this_process)
     return called
 
 
