@@ -242,6 +242,7 @@ def test_the_list_of_tables_says_how_large_each_is(capsys, tmp_path, monkeypatch
     assert code == 0
 
 
+@pytest.mark.parametrize("width", [80, None], indirect=True)
 def test_the_list_of_suites_cuts_no_name_and_counts_those_left_out(capsys, width):
     out = plumbob(capsys, "bench", "--list")[1]
     names = [claim.name for claim in CLAIMS.values()]
