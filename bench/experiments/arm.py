@@ -96,8 +96,7 @@ def _joint_angles(problem: FollowedCurve, motion: IKSolution) -> FloatArray:
 
 # What is shown.
 
-from ..figures.chart import Panel, Series, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, Series, declared_chart, series
 from ..figures.sketch import Sketch
 from ..peers import catalogue
 from ..tables.captions import Captions

@@ -19,7 +19,7 @@ from ..measure.block import Block, Group, Measured, Scale
 from ..measure.isolation import in_a_fresh_process
 from ..measure.progress import announce
 from ..measure.record import Record
-from ..measure.values import Floats1, Integers1, Values
+from ..measure.values import Fact, Floats1, Integers1, Values
 from ..peers.axes import REVOLUTION, all_within
 from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
 from ..peers.protocol import SolveFactory
@@ -47,14 +47,7 @@ ROUNDS = 5
 PATIENCE = 1800.0
 
 
-class BranchWords(Values, frozen=True, kw_only=True):
-    """The version of the solver, and the starts of the search."""
-
-    version: str
-    starts: int
-
-
-class BranchValues(BranchWords, frozen=True):
+class BranchValues(Values, frozen=True, kw_only=True):
     """The lists of a solver, an entry for each target with isolated solutions.
 
     Attributes:
@@ -65,6 +58,8 @@ class BranchValues(BranchWords, frozen=True):
         singular: how many further targets lie on a continuum of solutions.
     """
 
+    version: Fact[str]  # of the solver
+    starts: Fact[int]  # of the search
     solutions: Integers1
     missing: Integers1
     wrong: Integers1

@@ -23,7 +23,7 @@ from ..measure.chain_targets import (
 )
 from ..measure.measure import not_asked
 from ..measure.record import Record
-from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure.values import Booleans1, Fact, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.user_solver import CHAIN_TASK
 from ..problems.chains import BEYOND, SEED, STRATA, TargetsForSkeleton, chain_targets
@@ -48,12 +48,12 @@ NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 class SolveWords(Values, frozen=True, kw_only=True):
     """The tolerance [m] and the most iterations, how a frame starts, the stratum or curve."""
 
-    tolerance: float = math.nan
-    max_iterations: int | None = None
-    warm: bool | None = None
-    mode: str = ""  # of a closed curve
-    stratum: str = ""
-    curve: str = ""
+    tolerance: Fact[float] = math.nan
+    max_iterations: Fact[int | None] = None
+    warm: Fact[bool | None] = None
+    mode: Fact[str] = ""  # of a closed curve
+    stratum: Fact[str] = ""
+    curve: Fact[str] = ""
 
 
 class ChainSolves(SolveWords, frozen=True):
@@ -125,8 +125,7 @@ def _blocks_on(
 
 # What is shown.
 
-from ..figures.chart import Panel, Series, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, Series, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import (

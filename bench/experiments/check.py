@@ -5,24 +5,16 @@ from functools import partial
 
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Values
+from ..measure.values import Fact, Values
 
 
-class ClaimWords(Values, frozen=True, kw_only=True):
-    """The quantity computed by us, the reason for the tolerance, and why the claim failed.
-
-    An obstacle says why the claim could not be checked.
-    """
-
-    quantity: str = ""
-    reason: str = ""
-    failure: str = ""
-    obstacle: str = ""
-
-
-class ClaimValues(ClaimWords, frozen=True):
+class ClaimValues(Values, frozen=True, kw_only=True):
     """The largest relative difference over the cases, its tolerance, and the displacement."""
 
+    quantity: Fact[str] = ""  # as computed by us
+    reason: Fact[str] = ""  # for the tolerance
+    failure: Fact[str] = ""  # why the claim failed
+    obstacle: Fact[str] = ""  # why the claim could not be checked
     cases: int
     difference: float
     tolerance: float

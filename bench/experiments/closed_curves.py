@@ -130,8 +130,7 @@ MODES: dict[str, Callable[[FollowedCurve, str], IKSolution]] = {
 
 # What is shown.
 
-from ..figures.chart import SPAN, Panel, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import SPAN, Panel, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import folded, spread_of, text, words_in

@@ -14,7 +14,7 @@ from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
 from ..measure import metrics
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Floats1, Values
+from ..measure.values import Fact, Floats1, Values
 from ..peers import catalogue
 from ..problems.cloth_swing import (
     FALLING,
@@ -41,7 +41,7 @@ HALVED = tuple(H / 2**i for i in range(-1, 6))
 class StepWords(Values, frozen=True, kw_only=True):
     """The number of iterations of a step, where fixed."""
 
-    iterations: int = 0
+    iterations: Fact[int] = 0
 
 
 class IterationErrors(StepWords, frozen=True):
@@ -165,8 +165,7 @@ def step_damper_forces(system: MassSpring, before: State, after: State, h: float
 
 # What is shown.
 
-from ..figures.chart import Panel, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import text, words_in

@@ -24,7 +24,7 @@ from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import JobOutcome, Message, Ready, Solved, WorkerProcess
 from ..measure.measure import not_installed
 from ..measure.timing import messages_of
-from ..measure.values import Floats1, Integers1, Values
+from ..measure.values import Fact, Floats1, Integers1, Values
 from ..peers import catalogue
 from ..peers.peer import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, Peer
 from ..peers.protocol import Mover, OwnTime
@@ -71,24 +71,19 @@ DECADES = tuple(f"1e-{power}" for power in range(1, 9))
 # The records.
 
 
-class FallWords(Values, frozen=True, kw_only=True):
-    """The falling cloth, and the settings of its solver."""
-
-    stiffness: float  # of the springs [N/m]
-    cloth: str = ""  # the name of a user's cloth
-    rungs: tuple[str, ...] = ()  # the settings, (rung,)
-    remarks: tuple[str, ...] = ()  # on each setting, (rung,)
-    kind: str = ""  # how the solver's settings differ, see `Run`
-    sweep: int = 1  # the pass over all solvers in which it was measured
-    arbiter: str = ""  # the engine whose answer counts as the truth
-
-
-class Work(FallWords, frozen=True):
+class Work(Values, frozen=True, kw_only=True):
     """A step or a motion at increasing cost, (rung,), and how sure its arbiter is, (size,).
 
     A sweep measures every rung once.
     """
 
+    stiffness: Fact[float]  # of the springs [N/m]
+    cloth: Fact[str] = ""  # the name of a user's cloth
+    rungs: Fact[tuple[str, ...]] = ()  # the settings, (rung,)
+    remarks: Fact[tuple[str, ...]] = ()  # on each setting, (rung,)
+    kind: Fact[str] = ""  # how the solver's settings differ, see `Run`
+    sweep: Fact[int] = 1  # the pass over all solvers in which it was measured
+    arbiter: Fact[str] = ""  # the engine whose answer counts as the truth
     particles: Integers1  # along a side
     seconds: Floats1  # for a frame
     setup: Floats1  # time to set the solver up [s]
@@ -344,7 +339,7 @@ class Rung(NamedTuple):
 def step_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a step of a frame, from cheap to expensive."""
     if peer.run.kind == ITERATED:
-        return [_rung(peer, _counted(n, "iteration"), iterations=n) for n in peer.run.ladder]
+        return [_rung(peer, counted(n, "iteration"), iterations=n) for n in peer.run.ladder]
     return [_rung(peer, "1 step", substeps=1)]
 
 
@@ -352,23 +347,19 @@ def motion_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a motion: steps of part of a frame, which are nearer to the truth."""
     stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
     substeps = {EXPLICIT: stable, LINEARISED: PARTS, UNDECLARED: sorted({*PARTS, *stable})}
-    rungs = [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps.get(peer.run.kind, ())]
+    rungs = [_rung(peer, counted(n, "step"), substeps=n) for n in substeps.get(peer.run.kind, ())]
     for n, iterations in peer.run.motion:
-        name = f"{_counted(n, 'step')} of {_counted(iterations, 'iteration')}"
+        name = f"{counted(n, 'step')} of {counted(iterations, 'iteration')}"
         rungs.append(_rung(peer, name, substeps=n, iterations=iterations))
     if peer.run.converges:
         for n in PARTS:
-            name = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
+            name = f"{counted(n, 'step')} to {RESIDUAL_LABEL}"
             rungs.append(_rung(peer, name, tolerance=RESIDUAL, substeps=n))
     return rungs
 
 
 def _rung(peer: Peer, name: str, **settings: float) -> Rung:
     return Rung(name, {**peer.run.settings, **peer.spec, **settings})
-
-
-def _counted(count: int, name: str) -> str:
-    return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
 # The notes on unfinished solvers, by their titles and the number of particles.
@@ -426,15 +417,17 @@ def _error(task: str, frames: Sequence[Solved], fall: Fall) -> float:
 
 
 def _certainty(falls: Sequence[Fall]) -> dict[str, np.ndarray]:
-    """Return how sure the arbiters are at each size."""
+    """Return how sure the arbiters are at each size.
+
+    The rounding is the error of the converged step in single precision.
+    """
     truths = [fall.truth for fall in falls]
-    columns = zip(*((rounding(t), t.order, t.unsure) for t in truths), strict=True)
-    return dict(zip(("rounding", "order", "unsure"), map(np.array, columns), strict=True))
-
-
-def rounding(truth: ClothTruth) -> float:
-    """Return the error of the converged step rounded to single precision."""
-    return step_error(truth.first.positions.astype(np.float32).astype(float), truth)
+    rounded = [t.first.positions.astype(np.float32).astype(float) for t in truths]
+    return {
+        "rounding": np.array(list(map(step_error, rounded, truths))),
+        "order": np.array([truth.order for truth in truths]),
+        "unsure": np.array([truth.unsure for truth in truths]),
+    }
 
 
 def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
@@ -552,8 +545,7 @@ def worker_process() -> WorkerProcess:
 
 # What is shown.
 
-from ..figures.chart import Panel, Series, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, Series, declared_chart, series
 from ..figures.sketch import Sketch
 from ..measure.record import Record
 from ..tables.captions import Captions
@@ -607,6 +599,11 @@ class Point(NamedTuple):
         return str(self.record.values.cloth)
 
     @property
+    def is_whole(self) -> bool:
+        """Whether the setting reached the end."""
+        return bool(np.isfinite(self.error))
+
+    @property
     def stiffness(self) -> float:
         """The stiffness of the springs [N/m]."""
         return float(self.record.values.stiffness)
@@ -615,16 +612,6 @@ class Point(NamedTuple):
     def cloth(self) -> str:
         """The name of its cloth in tables."""
         return self.own or f"{self.particles} × {self.particles}, {words(int(self.stiffness))} N/m"
-
-    @property
-    def engine(self) -> str:
-        """The engine of its solver."""
-        return catalogue.find(self.solver).engine
-
-    @property
-    def is_whole(self) -> bool:
-        """Whether the setting reached the end."""
-        return bool(np.isfinite(self.error))
 
 
 def points(results: Results, task: str) -> list[Point]:
@@ -761,14 +748,10 @@ def _rows(
         yield ClothRow("every cloth", record.solver, missing=record.remark)
 
 
-def _time_to(error: float, row: ClothRow) -> float | None:
+def _of_cheapest(error: float, name: str, row: ClothRow) -> Cell:
+    """Return an attribute of the cheapest setting with so small an error, None without any."""
     cheapest = row.cheapest(error)
-    return cheapest and cheapest.seconds
-
-
-def _setting_for(error: float, row: ClothRow) -> str | None:
-    cheapest = row.cheapest(error)
-    return cheapest and cheapest.setting
+    return cheapest and getattr(cheapest, name)
 
 
 def _largest(name: str, row: ClothRow) -> float | None:
@@ -779,7 +762,9 @@ def _largest(name: str, row: ClothRow) -> float | None:
 def _columns(targets: Mapping[str, float], unit: str = "", *stable: Column) -> list[Column]:
     """Return the columns of a task: first the time to the last target, which ranks."""
     *times, first = (
-        Column(f"time to {target}", "ms", best="least", read=partial(_time_to, error))
+        Column(
+            f"time to {target}", "ms", best="least", read=partial(_of_cheapest, error, "seconds")
+        )
         for target, error in targets.items()
     )
     return [
@@ -787,7 +772,12 @@ def _columns(targets: Mapping[str, float], unit: str = "", *stable: Column) -> l
         text("solver", lambda row: row.solver),
         *(first, Column("smallest error", unit, best="least", read=lambda row: row.error)),
         *(*times, *stable[:1], text("remark", lambda row: row.remark)),
-        *folded(*(text(f"setting for {t}", partial(_setting_for, targets[t])) for t in targets)),
+        *folded(
+            *(
+                text(f"setting for {target}", partial(_of_cheapest, error, "setting"))
+                for target, error in targets.items()
+            )
+        ),
         *folded(text("setting for the smallest error", lambda row: row.best and row.best.setting)),
         *folded(Column("slowest over fastest sweep", read=partial(_largest, "drift"))),
         *folded(Column("difference between sweeps", read=partial(_largest, "spread"))),
@@ -799,25 +789,29 @@ def _measured_rows(rows: Sequence[ClothRow]) -> list[ClothRow]:
     return [row for row in rows if row.points]
 
 
+def _extent_of(name: str, rows: Sequence[ClothRow]) -> list[str]:
+    """Return the least and the greatest number of an array of the records, "–" without records."""
+    arrays = [getattr(row.points[0].record.values, name) for row in _measured_rows(rows)]
+    return [words(end) for end in metrics.extent(np.concatenate(arrays))] if arrays else ["–"] * 2
+
+
 def _rounding(rows: Sequence[ClothRow]) -> dict[str, str]:
     """Return the range of the errors of minimisers rounded to single precision."""
-    records = [row.points[0].record for row in _measured_rows(rows)]
-    if not records:
-        return dict.fromkeys(("rounding", "agreement"), "–")
-    low, high = metrics.extent(np.concatenate([record.values.rounding for record in records]))
-    ends = dict.fromkeys((words(low), words(high)))
-    return {"rounding": " to ".join(ends), **_agreement(rows)}
+    ends = dict.fromkeys(_extent_of("rounding", rows))
+    return {"rounding": " to ".join(ends), "agreement": _agreement(rows)}
 
 
-def _agreement(rows: Sequence[ClothRow]) -> dict[str, str]:
+def _agreement(rows: Sequence[ClothRow]) -> str:
     """Return a sentence on the drift of times, and on solvers whose sweeps gave other errors."""
+    if not _measured_rows(rows):
+        return "–"
     points = [point for row in rows for point in row.points]
     differing = listed(list({point.solver: 0 for point in points if point.spread > 0.0}))
     drift = words(max([1.0, *(point.drift for point in points)]))
     errors = f"equal to the bit but for {differing}" if differing else "the same bits"
     sweeps = max([1, *(point.sweeps for point in points)])
     sentence = f"The times of {counted(sweeps, 'sweep')} differ by a factor of at most {drift}"
-    return {"agreement": f"{sentence}; the errors are {errors}."}
+    return f"{sentence}; the errors are {errors}."
 
 
 def _summary(title: str, targets: Mapping[str, float], rows: Sequence[ClothRow]) -> Summary:
@@ -852,7 +846,8 @@ def _only_first(arrivals: Sequence[Point]) -> str:
 def _fastest(rows: Sequence[ClothRow], error: float) -> str:
     """Return the fastest of all solvers, and the fastest of all other engines."""
     arrivals = _arrivals(rows, error)
-    rivals = [point for point in arrivals if point.engine != arrivals[0].engine]
+    engines = [catalogue.find(point.solver).engine for point in arrivals]
+    rivals = [p for p, engine in zip(arrivals, engines, strict=True) if engine != engines[0]]
     names = [f"{p.solver}, {words_in(p.seconds, 'ms')}" for p in (*arrivals[:1], *rivals[:1])]
     return " (then ".join(names) + ")" * (len(names) > 1) or "none"
 
@@ -882,14 +877,10 @@ def _limits(record: Record) -> Iterator[tuple[tuple[str, float], StabilityLimit]
 
 def _certainty_of(rows: Sequence[ClothRow]) -> dict[str, str]:
     """Return the change of the true motions by halved steps, and the range of their order."""
-    records = [row.points[0].record for row in _measured_rows(rows)]
-    if not records:
-        return dict.fromkeys(("unsure", "low", "high", "agreement"), "–")
-    orders = np.concatenate([record.values.order for record in records])
-    unsure = words_in(max(float(record.values.unsure.max()) for record in records), "%")
-    low, high = metrics.extent(orders)
-    numbers = {"unsure": unsure, "low": words(low), "high": words(high)}
-    return {**numbers, **_agreement(rows)}
+    unsure = [float(row.points[0].record.values.unsure.max()) for row in _measured_rows(rows)]
+    low, high = _extent_of("order", rows)
+    largest = words_in(max(unsure), "%") if unsure else "–"
+    return {"unsure": largest, "low": low, "high": high, "agreement": _agreement(rows)}
 
 
 motion = CAPTIONS.layout(

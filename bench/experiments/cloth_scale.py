@@ -27,7 +27,7 @@ from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import in_a_fresh_process
 from ..measure.progress import announce
 from ..measure.record import Record
-from ..measure.values import Floats1, Values
+from ..measure.values import Fact, Floats1, Values
 from ..peers import catalogue
 
 # A frame [s], a stiff cloth [N/m], and the iterations of Liu et al. 2013.
@@ -45,19 +45,14 @@ STRETCH = 2**28
 PATIENCE = 1800.0
 
 
-class FactorWords(Values, frozen=True, kw_only=True):
-    """The number of particles, and the iterations of a step."""
-
-    particles: int
-    iterations: int
-
-
-class FactorCosts(FactorWords, frozen=True, kw_only=True):
+class FactorCosts(Values, frozen=True, kw_only=True):
     """A cloth factored by a library: times [s], (round,), and memory [bytes].
 
     None where only our factors are measured.
     """
 
+    particles: Fact[int]
+    iterations: Fact[int]
     before: int  # the memory before the cloth
     assembly: float | None = None
     factor: float

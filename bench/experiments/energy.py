@@ -9,7 +9,7 @@ from plumbob.reference import MassSpring, State, scenes, symplectic_euler
 
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Floats1, Values
+from ..measure.values import Fact, Floats1, Values
 
 # Particles along a side, and the dampings of the springs [N s/m].
 SIZE = 5
@@ -27,16 +27,11 @@ INTEGRATORS = (
 )
 
 
-class SwingWords(Values, frozen=True, kw_only=True):
-    """The damping of every spring [N s/m]; each `every`-th step counts."""
-
-    damping: float
-    every: int
-
-
-class Swing(SwingWords, frozen=True):
+class Swing(Values, frozen=True, kw_only=True):
     """The energy of a swing by an integrator, (state,)."""
 
+    damping: Fact[float]  # of every spring [N s/m]
+    every: Fact[int]  # each such step counts
     time: Floats1  # [s]
     left: Floats1  # the energy above that of the cloth at rest, over that of the start
 
@@ -87,8 +82,7 @@ def long_swing(name: str) -> tuple[MassSpring, State, float]:
 
 # What is shown.
 
-from ..figures.chart import Panel, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import text, words_in

@@ -16,10 +16,9 @@ from plumbob.reference.formats import urdf
 from ..clock import compute_time_of
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Booleans1, Floats1, Integers1, Values
-from ..problems.chains import unit
+from ..measure.values import Booleans1, Fact, Floats1, Integers1, Values
 from ..problems.evaluate import Targets, evaluator_of
-from ..problems.robot_targets import STRATA, farthest, robot_targets
+from ..problems.robot_targets import STRATA, robot_targets, targets_at
 from ..problems.robots import HELD_OUT, TUNING, group_of, is_installed, robot, seed_of, title
 
 SUITE, SOLVER = "ik_proofs", "Plumbob LM"
@@ -34,18 +33,13 @@ TOLERANCE, RESTARTS = 1e-3, 20
 _TARGETS = 0.025
 
 
-class ProofWords(Values, frozen=True, kw_only=True):
-    """The group of the robot, the kind of its targets, and the tolerances [m], [rad]."""
-
-    group: str
-    targets: str
-    tolerance: float
-    restarts: int
-
-
-class PoseProofs(ProofWords, frozen=True):
+class PoseProofs(Values, frozen=True, kw_only=True):
     """What is proven about the answers to targets, (target,)."""
 
+    group: Fact[str]  # of the robot
+    targets: Fact[str]  # their kind
+    tolerance: Fact[float]  # [m], [rad]
+    restarts: Fact[int]
     converged: Booleans1  # whether the solver says that it has reached the target
     reached: Booleans1  # whether that is proven
     coverage: Integers1  # of the certificates
@@ -92,15 +86,14 @@ def prove(name: str, kind: str, count: int, seed: int) -> Measured:
     anew = urdf.parse(arm.text).articulation
     far = Target(positions[0] + 100.0, rotations[0], effector)
     _, setup = compute_time_of(partial(certify_ik, anew, anew.neutral(), far))
-    bounds = np.array([certificate.least_distance for certificate in certificates])
+    names = ("reached", "coverage", "distance", "least_distance")
+    proven = {name: np.array([getattr(proof, name) for proof in certificates]) for name in names}
     levers = np.array([certificate.lever for certificate in certificates])
+    distance = solution.residual + levers * solution.residual_rotation
     return {
+        **proven,
         "converged": solution.outcome == Outcome.CONVERGED,
-        "reached": np.array([certificate.reached for certificate in certificates]),
-        "coverage": np.array([int(certificate.coverage) for certificate in certificates]),
-        "distance": np.array([certificate.distance for certificate in certificates]),
-        "least_distance": bounds,
-        "refuted": solution.residual + levers * solution.residual_rotation < bounds,
+        "refuted": distance < proven["least_distance"],
         "seconds": np.array(seconds),
         "setup": setup,
     }
@@ -108,12 +101,8 @@ def prove(name: str, kind: str, count: int, seed: int) -> Measured:
 
 def poses_anywhere(name: str, count: int, seed: int) -> Targets:
     """Return random poses, uniform in the ball with the sum of the links as radius."""
-    evaluator, rng = evaluator_of(name), np.random.default_rng([seed, seed_of(name), 2])
-    size = count * len(STRATA)
-    distance = farthest(evaluator) * rng.random((size, 1, 1)) ** (1.0 / 3.0)
-    positions = evaluator.first_joint + distance * unit(rng.standard_normal((size, 1, 3)))
-    rotations = rotation.to_matrix(rotation.random(rng, size, 1))
-    return Targets(positions, rotations, evaluator.robot.draw(rng, size), np.zeros(size, dtype=int))
+    rng = np.random.default_rng([seed, seed_of(name), 2])
+    return targets_at(evaluator_of(name), rng, rng.random((count * len(STRATA), 1)) ** (1.0 / 3.0))
 
 
 # What is shown.

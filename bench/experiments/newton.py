@@ -16,7 +16,7 @@ from plumbob.reference.implicit_euler.objective import Objective
 
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Values
+from ..measure.values import Fact, Values
 from ..peers import catalogue
 from ..problems.cloth_swing import TOLERANCE, ClothSwing, integrator_of
 
@@ -35,19 +35,14 @@ FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
 QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
 
 
-class CertifiedWords(Values, frozen=True, kw_only=True):
-    """The cloth's stiffness [N/m], the tolerance and start of the solve, and the kind of bound."""
-
-    stiffness: float
-    tolerance: float
-    start: str
-    coverage: str = ""
-    why: str = ""  # the sentence of the bound
-
-
-class CertifiedStep(CertifiedWords, frozen=True, kw_only=True):
+class CertifiedStep(Values, frozen=True, kw_only=True):
     """A solver's solution of the step; lengths in metres."""
 
+    stiffness: Fact[float]  # of the cloth [N/m]
+    tolerance: Fact[float]
+    start: Fact[str]
+    coverage: Fact[str] = ""  # the kind of bound
+    why: Fact[str] = ""  # the sentence of the bound
     size: int  # particles along a side
     iterations: int
     residual: float

@@ -11,7 +11,7 @@ from plumbob.reference import IK_SOLVERS, ImplicitEuler, rotation, scenes, track
 from ..measure import metrics
 from ..measure.block import Block, Measured, Scale
 from ..measure.record import Record
-from ..measure.values import Floats1, Floats2, Floats3, Integers1, Values
+from ..measure.values import Fact, Floats1, Floats2, Floats3, Integers1, Values
 from ..problems.cloth_swing import TOLERANCE, H, cloth_swing, converged_motion, motion
 from ..problems.curves import CUSTOM, MAX_SPACING, MIN_SPACING, custom_curve, evened_custom_curve
 
@@ -58,7 +58,7 @@ class ClothDrawing(Values, frozen=True):
 class MovingWords(Values, frozen=True, kw_only=True):
     """The position of a motion in the order."""
 
-    order: int
+    order: Fact[int]
 
 
 class MovingArm(MovingWords, frozen=True):

@@ -14,7 +14,7 @@ from ..measure import metrics
 from ..measure.block import Block, Measured, Scale
 from ..measure.chain_targets import SolverLimits, blocks_of_users
 from ..measure.record import Record
-from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure.values import Booleans1, Fact, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.ik import toolbox, trac_ik
 from ..peers.peer import ONE_START, RESTARTS, Peer, Run
@@ -39,15 +39,10 @@ _LIMITS: dict[str, Any] = {
 _FAST = (catalogue.PLUMBOB_LM, toolbox.PEER, trac_ik.PEER)
 
 
-class FabrikWords(Values, frozen=True, kw_only=True):
-    """The stratum of the targets."""
-
-    stratum: str
-
-
-class FabrikSolves(FabrikWords, frozen=True):
+class FabrikSolves(Values, frozen=True, kw_only=True):
     """The iterations of each solve, NaN if not reported, and the remaining distances [m]."""
 
+    stratum: Fact[str]
     iterations: Floats1
     residual: Floats1
     # A user's solver has the other numbers of `ChainSolves` too.

@@ -13,7 +13,7 @@ from plumbob.reference.formats import mjcf, urdf
 from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import Calculation, worker_process
 from ..measure.record import Record
-from ..measure.values import Values
+from ..measure.values import Fact, Values
 from ..peers import catalogue
 from ..peers.catalogue import KINEMATICS
 from ..peers.peer import Peer
@@ -28,22 +28,17 @@ PEERS = "peers"
 ROBOT_CONFIGURATIONS = 100  # random, of a robot
 
 
-class FileWords(Values, frozen=True, kw_only=True):
-    """Why an engine reads a file otherwise or not at all, and the mimics left free."""
-
-    configurations: int
-    cause: str = ""
-    free_mimics: str = ""
-    unread: str = ""
-
-
-class FileValues(FileWords, frozen=True):
+class FileValues(Values, frozen=True, kw_only=True):
     """The size of a file in an engine, and its largest differences from the reference.
 
     Positions are relative to the extent of the links, rotations are between entries of matrices,
     Jacobians relative to the extent and 1 radian.
     """
 
+    configurations: Fact[int]
+    cause: Fact[str] = ""  # why an engine reads the file otherwise
+    free_mimics: Fact[str] = ""  # the mimics left free
+    unread: Fact[str] = ""  # why an engine does not read the file
     links: int
     joints: int
     freedoms: int
@@ -52,16 +47,11 @@ class FileValues(FileWords, frozen=True):
     jacobians: float
 
 
-class EngineWords(Values, frozen=True, kw_only=True):
-    """The engine's version."""
-
-    configurations: int
-    version: str
-
-
-class EffectorDifferences(EngineWords, frozen=True):
+class EffectorDifferences(Values, frozen=True, kw_only=True):
     """The largest differences of effectors: positions [m], and entries of rotation matrices."""
 
+    configurations: Fact[int]
+    version: Fact[str]  # of the engine
     positions: float
     rotations: float
 

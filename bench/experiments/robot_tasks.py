@@ -13,7 +13,7 @@ from ..measure.block import Block, Measured, Scale
 from ..measure.progress import announce
 from ..measure.record import Record
 from ..measure.timing import attempt, restarted
-from ..measure.values import Booleans1, Floats1, Values
+from ..measure.values import Booleans1, Fact, Floats1, Values
 from ..peers.catalogue import PLUMBOB, PLUMBOB_LM, TASK_SOLVERS
 from ..peers.peer import ONE_START, RESTARTS, Peer
 from ..problems.evaluate import evaluator_of
@@ -28,15 +28,10 @@ TOLERANCE = 1e-3  # [m], [rad]
 _TARGETS = 0.01
 
 
-class TaskWords(Values, frozen=True, kw_only=True):
-    """The attempts of a solver."""
-
-    kind: str
-
-
-class TaskValues(TaskWords, frozen=True):
+class TaskValues(Values, frozen=True, kw_only=True):
     """The answers of a solver to the targets of a robot, (target,)."""
 
+    kind: Fact[str]  # of the attempts
     solved: Booleans1  # whether MuJoCo confirms the answer within the limits
     seconds: Floats1  # the time of a call, all attempts together [s]
     distance: Floats1  # from the middle of the limits, root mean square of all joints [rad]

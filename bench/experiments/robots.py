@@ -20,7 +20,7 @@ from ..measure.isolation import JobOutcome, Solved, raised
 from ..measure.measure import not_asked, not_installed
 from ..measure.progress import announce
 from ..measure.timing import Job, Times, answers, first_targets, times_in_turns
-from ..measure.values import Booleans1, Floats1, Floats2, Integers1, Values
+from ..measure.values import Booleans1, Fact, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.peer import Peer, Run
 from ..peers.user_solver import ROBOT_TASK
@@ -64,32 +64,11 @@ _ANY = {"kind": "any"}
 NO_ROBOTS = "not asked for robots: it offers no robot_inverse_kinematics"
 
 
-class RobotWords(Values, frozen=True, kw_only=True):
-    """The solver's start and version, and a description of the robot.
+class RobotSolves(Values, frozen=True, kw_only=True):
+    """The targets of a solver, (target,); only `setup` if no target was begun.
 
     Targets, a pose or a position for each effector, are solved within the tolerances [m], [rad].
     Their seeds alternate, stratum after stratum.
-    """
-
-    kind: str = ""
-    version: str = ""
-    tolerance: float = 0.0
-    tolerance_rotation: float = 0.0
-    seeds: int = 1
-    strata: list[str] = msgspec.field(default_factory=list)
-    effectors: list[str] = msgspec.field(default_factory=list)
-    joints: int = 0
-    freedom: int = 0
-    target: str = ""
-    group: str = ""  # of the robot, never averaged with another group
-    arbiter: str = ""  # the engine that evaluates the answers
-    time_limited: bool = False  # whether a time limit ends the solves
-    robot: str = ""  # of a published table
-    infeasible: float | None = None  # published share of infeasible targets [%]
-
-
-class RobotSolves(RobotWords, frozen=True, kw_only=True):
-    """The targets of a solver, (target,); only `setup` if no target was begun.
 
     Attributes:
         solved: whether the evaluation finds the target solved.
@@ -108,6 +87,21 @@ class RobotSolves(RobotWords, frozen=True, kw_only=True):
         repeats: how many targets a solver with a time limit solves each time, (repeat,).
     """
 
+    kind: Fact[str] = ""
+    version: Fact[str] = ""
+    tolerance: Fact[float] = 0.0
+    tolerance_rotation: Fact[float] = 0.0
+    seeds: Fact[int] = 1
+    strata: Fact[list[str]] = msgspec.field(default_factory=list)
+    effectors: Fact[list[str]] = msgspec.field(default_factory=list)
+    joints: Fact[int] = 0
+    freedom: Fact[int] = 0
+    target: Fact[str] = ""
+    group: Fact[str] = ""  # of the robot, never averaged with another group
+    arbiter: Fact[str] = ""  # the engine that evaluates the answers
+    time_limited: Fact[bool] = False  # whether a time limit ends the solves
+    robot: Fact[str] = ""  # of a published table
+    infeasible: Fact[float | None] = None  # published share of infeasible targets [%]
     solved: Booleans1 | None = None
     claims: Integers1 | None = None
     seconds: Floats2 | None = None
@@ -341,12 +335,11 @@ from collections import Counter
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ..figures.chart import Panel, Series, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import Panel, Series, declared_chart, series
 from ..figures.robot_map import draw_maps, robot_maps
 from ..figures.sketch import Sketch
 from ..measure import metrics
-from ..measure.metrics import Floats, Interval
+from ..measure.metrics import Floats
 from ..measure.record import Record
 from ..peers.peer import (
     ONE_START,
@@ -469,7 +462,7 @@ def _participant_summary(rows: Sequence[Participant]) -> Summary:
 
 def _robot(record: Record) -> str:
     """Return the joints of a robot, and the target of its effectors."""
-    robot: RobotWords = record.values
+    robot: RobotSolves = record.values
     freedoms = "" if robot.freedom == robot.joints else f", {robot.freedom} freedoms"
     effectors = listed(robot.effectors)
     return f"{record.title}: {robot.joints} joints{freedoms}, {robot.target} of {effectors}"
@@ -593,29 +586,31 @@ FIGURES: tuple[Figure, ...] = (
 # Columns of scores.
 
 
-def _of_interval(
-    title: str, read: Callable[[Score], Interval], best: str = ""
-) -> tuple[Column, Column, Column]:
-    """Return the columns of an estimate of a time and of its interval [µs]."""
-    low, high = (f"{title}, 95 % {bound}" for bound in ("low", "high"))
-    return (
-        Column(title, "µs", best=best, read=lambda score: number(read(score).value)),
-        Column(low, "µs", read=lambda score: number(read(score).low)),
-        Column(high, "µs", read=lambda score: number(read(score).high)),
+def _parts(
+    title: str, unit: str, read: Callable[[Score], Any], **endings: str
+) -> tuple[Column, ...]:
+    """Return the columns of parts of an estimate: each part with the ending of its title."""
+
+    def cell(part: str, score: Score) -> float | None:
+        return number(getattr(read(score), part))
+
+    return tuple(
+        Column(title + ending, unit, read=partial(cell, part)) for part, ending in endings.items()
     )
 
 
-def _of_spread(title: str, unit: str, read: Callable[[Score], Floats]) -> tuple[Column, Column]:
+# The columns of an estimate of a time and of its interval.
+_of_interval = partial(_parts, unit="µs", value="", low=", 95 % low", high=", 95 % high")
+
+
+def _of_spread(title: str, unit: str, read: Callable[[Score], Floats]) -> tuple[Column, ...]:
     """Return the columns of the median and the largest of the finite numbers."""
 
     def spread(score: Score) -> metrics.Spread:
         numbers = read(score)
         return metrics.spread(numbers[np.isfinite(numbers)])
 
-    return (
-        Column(f"{title}, median", unit, read=lambda score: number(spread(score).median)),
-        Column(f"{title}, largest", unit, read=lambda score: number(spread(score).largest)),
-    )
+    return _parts(title, unit, spread, median=", median", largest=", largest")
 
 
 def _outcome(name: str, folded: bool = False) -> Column:
@@ -655,7 +650,7 @@ _BY_SEED = (
     text(f"{MEAN}, by seed", lambda s: _list_by_seed([1e6 * x for x in s.mean_times_by_seed])),
 )
 _MEDIAN, *_MEDIAN_BOUNDS = _of_interval(
-    "time, median", lambda score: metrics.median_interval(score.seconds)
+    "time, median", read=lambda score: metrics.median_interval(score.seconds)
 )
 _TAIL = (
     Column("time, 95 %", "µs", read=lambda score: number(metrics.spread(score.seconds).p95)),
@@ -729,12 +724,12 @@ def _summary(rows: Sequence[Score]) -> Summary:
     return listing(sentence, _points(rows))
 
 
-_MEAN, *_MEAN_BOUNDS = _of_interval(MEAN, lambda score: score.mean_time, best="least")
+_MEAN, *_MEAN_BOUNDS = _of_interval(MEAN, read=lambda score: score.mean_time)
 over_all = _layout(
     "robots_overall",
     scores.overall,
     (
-        *(*_SOLVER, _SOLVED, _FALSE, _MEAN),
+        *(*_SOLVER, _SOLVED, _FALSE, replace(_MEAN, best="least")),
         text("mark", _mark),
         *folded(*_MEAN_BOUNDS, *_BY_SEED),
         *folded(*map(_outcome, OUTCOMES[1:]), _DISPUTED, _GROUP),
@@ -749,7 +744,7 @@ robot_by_robot = _layout(
         Column(RELATIVE, best="least", read=lambda score: number(score.relative_time)),
         Column(BESIDE_OURS, best="least", read=lambda score: number(score.ratio_to_ours)),
         *(text("mark", _mark), _GROUP),
-        *folded(*_MEDIAN_BOUNDS, *_TAIL, replace(_MEAN, best=""), *_MEAN_BOUNDS),
+        *folded(*_MEDIAN_BOUNDS, *_TAIL, _MEAN, *_MEAN_BOUNDS),
         *folded(*_of_spread("position residual", "m", _reached("position"))),
         *folded(*_of_spread("rotation residual", "rad", _reached("rotation"))),
         *folded(Column("set-up", "ms", read=lambda score: score.records[0].values.setup)),

@@ -23,7 +23,7 @@ from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import in_a_fresh_process
 from ..measure.progress import announce
 from ..measure.record import Record
-from ..measure.values import Floats2, Values
+from ..measure.values import Fact, Floats2, Values
 from ..peers import catalogue
 from ..peers.protocol import describe
 
@@ -42,19 +42,14 @@ ROUNDS = 200
 QUICK = 1e-3
 
 
-class WorkWords(Values, frozen=True, kw_only=True):
-    """The timed work: see `TimedWork`."""
-
-    subject: str
-    group: str
-    work: str
-    noise: float = math.nan  # half the width of the middle 80 % of a fixed loop's times
-    together: str = ""  # a word that all cases timed in turns have in common
-
-
-class RoundTimes(WorkWords, frozen=True):
+class RoundTimes(Values, frozen=True, kw_only=True):
     """The seconds of an operation, (sweep, round), and the bytes moved as a yardstick."""
 
+    subject: Fact[str]
+    group: Fact[str]
+    work: Fact[str]
+    noise: Fact[float] = math.nan  # half the width of the middle 80 % of a fixed loop's times
+    together: Fact[str] = ""  # a word that all cases timed in turns have in common
     seconds: Floats2
     moved: float
     error: float | None = None  # that a tolerance leaves, relative to the length of the step
@@ -204,8 +199,7 @@ def shape(timer: Timer, seconds: float) -> tuple[int, int]:
 
 import re
 
-from ..figures.chart import MARKS, Panel, Series, series
-from ..figures.chart_sketch import declared_chart
+from ..figures.chart import MARKS, Panel, Series, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import folded, text, words_in

@@ -1,16 +1,23 @@
-"""A chart as data: panels of curves or of marks in rows, the labelled solvers, and their looks."""
+"""A chart as data: panels of curves or of marks in rows, the labelled solvers, and their looks.
+
+Sketches of charts import the drawing only when drawn.
+"""
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..peers import catalogue
+from .sketch import Sketch
 from .style import Style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Floats = NDArray[np.float64]
 
@@ -196,3 +203,33 @@ def _preferred(name: str) -> tuple[Style, ...]:
     own = catalogue.find(name).colour
     first = colours.index(own) if own in colours else zlib.crc32(name.encode()) % len(LOOKS)
     return LOOKS[first:] + LOOKS[:first]
+
+
+def chart_sketch(chart: Chart) -> Sketch | None:
+    """Return the sketch of a chart, None if the chart has no curves."""
+    if not any(panel.series for panel in chart.panels):
+        return None
+    return Sketch(chart.name, chart.title, chart.caption, chart, _draw_chart)
+
+
+def _draw_chart(chart: Chart) -> "Figure":
+    from .drawing import draw_chart
+
+    return draw_chart(chart)
+
+
+def declared_chart(
+    declared: Mapping[str, Any],
+    panels: Iterable[Panel],
+    user_solvers: frozenset[str],
+    **fields: Any,
+) -> Sketch | None:
+    """Return the sketch of a chart declared in a file of captions; None without panels.
+
+    `fields` are the undeclared or different fields of `Chart`.
+    """
+    chart = {"panels": tuple(panels), "user_solvers": user_solvers, **declared, **fields}
+    for name in ("x", "y"):
+        axis = {"limits": (), **chart.get(name, {})}
+        chart[name] = Axis(**{**axis, "limits": (*axis["limits"], None, None)[:2]})
+    return chart_sketch(Chart(**chart)) if chart["panels"] else None

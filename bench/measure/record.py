@@ -101,14 +101,14 @@ class Record:
     def values(self) -> Any:
         """Settings and measured values as the type declared in the experiment, None without a type.
 
-        A record without numbers is read as the type above.
+        A record without numbers is read as the type of its facts.
         """
         kind = kind_of(self.suite, self.task)
         if kind is None:
             return None
         arrays = values.array_names(kind)  # such as the times, where a time limit is a setting
         settings = {name: v for name, v in self.settings.items() if name not in arrays}
-        type_read = kind if self.has_numbers else values.words_of(kind)
+        type_read = kind if self.has_numbers else values.facts_of(kind)
         return values.read(type_read, {**settings, **self.measured})
 
     @functools.cached_property
@@ -123,7 +123,7 @@ class Record:
         """The numbers that the type declares, and all arrays, of whatever revision."""
         kind = kind_of(self.suite, self.task)
         arrays = {name for name, v in self.measured.items() if isinstance(v, np.ndarray)}
-        return arrays | (values.own_names(kind) if kind else set())
+        return arrays | (values.number_names(kind) if kind else set())
 
     def numbers(self) -> dict[str, np.ndarray]:
         """Return the arrays and the scalars measured, by name."""

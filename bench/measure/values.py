@@ -4,8 +4,9 @@ Settings and measured values are read into the type. A record with a missing fie
 another type, is refused.
 """
 
+import functools
 from collections.abc import Iterable, Mapping
-from typing import Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, get_args
 
 import msgspec
 import numpy as np
@@ -16,6 +17,10 @@ Floats3 = np.ndarray[tuple[int, int, int], np.dtype[np.float64]]
 Integers1 = np.ndarray[tuple[int], np.dtype[np.int64]]
 Booleans1 = np.ndarray[tuple[int], np.dtype[np.bool_]]
 
+Entry = TypeVar("Entry")
+# A field that is no number of the measurement: a setting, a word, a condition.
+Fact = Annotated[Entry, "fact"]
+
 # The kinds of numbers for a field, by its own kind: integers may stand for floats.
 _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 
@@ -23,9 +28,8 @@ _TAKES = {"f": "fiu", "i": "iu", "b": "b"}
 class Values(msgspec.Struct, frozen=True, eq=False, kw_only=True):
     """The settings and measured values of a block: words, numbers, and arrays with axes.
 
-    The words of a block stand in a class of their own, each with a default; the class below adds
-    the numbers. A record without numbers, as of a solver that is not installed, has the words only.
-    A None field is not on record.
+    A record without numbers, as of a solver that is not installed, has facts only. A None field is
+    not on record.
     """
 
     title: str = ""  # of the problem, as written
@@ -61,9 +65,10 @@ def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
         raise ValueError(str(error).replace("$.", "")) from None
 
 
-def own_names(kind: type[Values]) -> set[str]:
-    """Return the names on record of the fields that a type adds to the type above: its numbers."""
-    return _names(kind) - _names(words_of(kind))
+def number_names(kind: type[Values]) -> set[str]:
+    """Return the names of the fields of a type that are no facts."""
+    facts = {field.name for field in msgspec.structs.fields(kind) if "fact" in get_args(field.type)}
+    return _names(kind) - _names(Values) - facts
 
 
 def array_names(kind: type[Values]) -> set[str]:
@@ -71,10 +76,16 @@ def array_names(kind: type[Values]) -> set[str]:
     return {f.name for f in msgspec.structs.fields(kind) if np.ndarray.__name__ in str(f.type)}
 
 
-def words_of(kind: type[Values]) -> type[Values]:
-    """Return the type of the words of a block: the type above."""
-    above = kind.__base__
-    return above if above and issubclass(above, Values) else kind
+@functools.cache
+def facts_of(kind: type[Values]) -> type[Values]:
+    """Return the type of the facts of a block alone."""
+    left_out = number_names(kind) | _names(Values)
+    facts = [
+        (f.name, f.type, msgspec.field(default=f.default, default_factory=f.default_factory))
+        for f in msgspec.structs.fields(kind)
+        if f.name not in left_out
+    ]
+    return msgspec.defstruct(kind.__name__, facts, bases=(Values,), frozen=True, kw_only=True)
 
 
 def _names(kind: type[Values]) -> set[str]:

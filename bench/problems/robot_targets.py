@@ -84,12 +84,21 @@ def stratum_poses(
 def unreachable_targets(name: str, count: int, seed: int = SEED) -> Targets:
     """Return targets 1.05 to 1.5 times as far from the first joint as any pose reaches."""
     evaluator, rng = evaluator_of(name), np.random.default_rng([seed, seed_of(name), 1])
-    shape = (count, len(evaluator.robot.effectors))
-    distance = farthest(evaluator) * rng.uniform(1.05, 1.5, (*shape, 1))
-    positions = evaluator.first_joint + distance * unit(rng.standard_normal((*shape, 3)))
+    return targets_at(
+        evaluator, rng, rng.uniform(1.05, 1.5, (count, len(evaluator.robot.effectors)))
+    )
+
+
+def targets_at(evaluator: Evaluator, rng: np.random.Generator, distance: FloatArray) -> Targets:
+    """Return random poses at distances from the first joint, (target, effector).
+
+    The unit of the distances is the sum of all link lengths.
+    """
+    shape, length = distance.shape, farthest(evaluator)
+    offsets = length * distance[..., None] * unit(rng.standard_normal((*shape, 3)))
     rotations = rotation.to_matrix(rotation.random(rng, *shape))
-    starts = evaluator.robot.draw(rng, count)
-    return Targets(positions, rotations, starts, np.zeros(count, dtype=int))
+    starts, strata = evaluator.robot.draw(rng, len(distance)), np.zeros(len(distance), dtype=int)
+    return Targets(evaluator.first_joint + offsets, rotations, starts, strata)
 
 
 def least_distances(name: str, targets: Targets) -> FloatArray:

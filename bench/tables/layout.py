@@ -46,7 +46,7 @@ class Layout:
     subjects: Callable[[Results], Iterable[Any]]  # of the rows, such as records
     # of the table, or a function from all subjects to the words
     columns: Sequence[Column] | Callable[[Any], Sequence[Column]]
-    shows: str | Callable[[Any], str]  # a sentence on the contents, or a function of all subjects
+    shows: str  # a sentence on the contents
     # a sentence on how the numbers were measured, or a function of all subjects
     measured: str | Callable[[Any], str]
     # of the numbers, called with all subjects if there are any
@@ -76,7 +76,7 @@ class Layout:
             self.title,
             columns,
             cells(columns, subjects),
-            self.shows if isinstance(self.shows, str) else self.shows(subjects),
+            self.shows,
             measured,
             self.summary(subjects) if subjects else NO_SUMMARY,
             self.compared,

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from plumbob.reference.arguments import name_list
 
-from .table import NO_SUMMARY, Table, best_cells, number_of, with_rows, words
+from .table import NO_SUMMARY, Table, number_of, with_columns, with_rows, words
 
 # The most values of a column that a message lists.
 _MAX_LISTED = 12
@@ -28,14 +28,8 @@ def selected(
     places = _ordered(part, order) if order else [*range(len(part.rows))]
     positions = [j for text in columns for j in column_numbers(table, text)]
     numbers = [*dict.fromkeys(positions)] or [*range(len(table.columns))]
-    best, ordered = best_cells(part), with_rows(part, places)
-    return replace(
-        ordered,
-        columns=tuple(table.columns[j] for j in numbers),
-        rows=tuple(tuple(row[j] for j in numbers) for row in ordered.rows),
-        summary=table.summary if len(part.rows) == len(table.rows) else NO_SUMMARY,
-        best=frozenset((places.index(i), numbers.index(j)) for i, j in best if j in numbers),
-    )
+    summary = table.summary if len(part.rows) == len(table.rows) else NO_SUMMARY
+    return replace(with_columns(with_rows(part, places), numbers), summary=summary)
 
 
 def _passing(table: Table, filters: Sequence[str]) -> list[int]:

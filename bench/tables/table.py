@@ -48,7 +48,6 @@ class Column:
     note: str = ""
     # returns the cell of a subject, in SI units or as a share of 1
     read: Callable[[Any], Any] = field(default=lambda subject: subject, compare=False)
-    factor: float | None = None  # of the cell, if not that of the unit
     best: str = ""  # "least" or "greatest", "" if no cell is best
     group: str = ""  # common heading of neighbouring columns
     folded: bool = False  # whether the column is shown on demand only
@@ -57,9 +56,7 @@ class Column:
         """Return the cell of the row of this subject, in the column's unit."""
         value = self.read(subject)
         plain: Cell = value.item() if hasattr(value, "item") else value
-        if not isinstance(plain, float):
-            return plain
-        return in_unit(plain, self.unit) if self.factor is None else self.factor * plain
+        return in_unit(plain, self.unit) if isinstance(plain, float) else plain
 
     @property
     def below(self) -> str:
@@ -222,18 +219,19 @@ def _ties(cell: Cell, best: Cell) -> bool:
     return words(cell) == words(best)
 
 
+def with_columns(table: Table, numbers: Sequence[int]) -> Table:
+    """Return a table with the columns of these numbers, and the best cells as before."""
+    best = ((i, numbers.index(j)) for i, j in best_cells(table) if j in numbers)
+    rows = tuple(tuple(row[j] for j in numbers) for row in table.rows)
+    columns = tuple(table.columns[j] for j in numbers)
+    return replace(table, columns=columns, rows=rows, best=frozenset(best))
+
+
 def without_empty(table: Table) -> Table:
     """Return a table without empty columns."""
-    count = len(table.columns)
-    filled = [j for j in range(count) if any(words(row[j]) for row in table.rows)]
-    filled = filled or list(range(count))
-    best = {(i, filled.index(j)) for i, j in best_cells(table) if j in filled}
-    return replace(
-        table,
-        columns=tuple(table.columns[j] for j in filled),
-        rows=tuple(tuple(row[j] for j in filled) for row in table.rows),
-        best=frozenset(best),
-    )
+    numbers = range(len(table.columns))
+    filled = [j for j in numbers if any(words(row[j]) for row in table.rows)]
+    return with_columns(table, filled or numbers)
 
 
 def naming(table: Table) -> int:

@@ -11,8 +11,16 @@ import pytest
 from plumbob.bench.figures import canvas, drawing
 from plumbob.bench.figures import sketch as figures
 from plumbob.bench.figures.canvas import pdf_of  # before its stand-in is in place
-from plumbob.bench.figures.chart import LOOKS, MAX_LABELLED, Axis, Chart, Panel, looks, series
-from plumbob.bench.figures.chart_sketch import chart_sketch
+from plumbob.bench.figures.chart import (
+    LOOKS,
+    MAX_LABELLED,
+    Axis,
+    Chart,
+    Panel,
+    chart_sketch,
+    looks,
+    series,
+)
 from plumbob.bench.figures.sketch import drawn
 from plumbob.bench.page import page, report
 from plumbob.bench.tables.results import Results
@@ -177,10 +185,9 @@ def test_no_legend_covers_the_data(records, count):
             ), chart.name
 
 
-@pytest.mark.parametrize("count", [9])
-def test_no_point_lies_outside_of_its_axes(records, count):
+def test_no_point_lies_outside_of_its_axes(records):
     """But for what the limits of the chart itself leave out."""
-    for chart in charts(with_solvers(records, count)):
+    for chart in charts(with_solvers(records, 9)):
         figure = laid_out(chart)
         for ax, panel in zip(figure.axes, chart.panels, strict=True):
             for one in panel.series:

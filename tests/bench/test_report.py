@@ -13,7 +13,7 @@ from html_page import Page
 
 from plumbob.bench.experiments import SUITES
 from plumbob.bench.measure.record import RecordFile
-from plumbob.bench.measure.values import words_of
+from plumbob.bench.measure.values import facts_of
 from plumbob.bench.page import report
 from plumbob.bench.page.sections import SECTIONS
 from plumbob.bench.tables.results import Results, results_of
@@ -221,7 +221,7 @@ def with_numbers(record, numbers):
 
 def _needs_more(record):
     """Whether a record has a word that it needs, further numbers, and none of truth values."""
-    above = words_of(type(record.values))
+    above = facts_of(type(record.values))
     is_needed = any(field.required for field in msgspec.structs.fields(above))
     numbers = record.numbers().values()
     return is_needed and len(numbers) > 1 and any(array.dtype != bool for array in numbers)

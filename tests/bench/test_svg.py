@@ -6,8 +6,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from plumbob.bench.figures.chart import Axis, Chart, Panel, series
-from plumbob.bench.figures.chart_sketch import chart_sketch
+from plumbob.bench.figures.chart import Axis, Chart, Panel, chart_sketch, series
 from plumbob.bench.figures.sketch import Drawing, drawn
 from plumbob.bench.figures.style import COLOURS
 from plumbob.bench.figures.svg import inline

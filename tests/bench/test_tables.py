@@ -12,9 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from plumbob.bench.measure.metrics import Share, share
-from plumbob.bench.page.sections import SECTIONS
 from plumbob.bench.tables import writers
-from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import Column, Summary, Table, best_cells, words
 
 HOSTILE = 'a|b & 50% of_x #1 {y} $z^2 ~ \\cmd <script>"quoted", `code` *star* [link](x)\nnext'
@@ -60,7 +58,6 @@ def test_words(value, text):
 def test_a_column_converts_what_it_reads_to_its_unit(unit, value):
     assert Column("a", unit).cell(np.float64(2.0)) == pytest.approx(value, rel=1e-15)
     assert Column("a", unit).cell(np.int64(2)) == 2
-    assert Column("a", unit, factor=1.0).cell(2.0) == 2.0
 
 
 @given(st.floats(-1e300, 1e300))
@@ -197,26 +194,3 @@ def test_a_row_that_is_cut_short_is_never_best():
 
 def test_a_column_without_a_best_has_none():
     assert ranked([1.0, 2.0], "") == set()
-
-
-# Columns that these records leave empty: of other runs, or of longer histories.
-LEFT_EMPTY = {
-    *(
-        f"{name} after {count}"
-        for name in ("error", "residual")
-        for count in ("10", "100", "1,000")
-    ),
-    *(f"left after {count} steps" for count in ("100", "1,000", "10,000")),
-    *("time to 1 %", "setting for 1 %", "longest stable step", "stability limit", "2 / ω"),
-}
-
-
-def test_every_declared_column_is_filled_by_the_rows(records):
-    """A misspelt title would show an empty column, which no reader sees."""
-    results, empty = Results(records), set()
-    for layout in (layout for section in SECTIONS for layout in section.layouts):
-        rows = list(layout.subjects(results))
-        if rows and isinstance(rows[0], dict):
-            columns = layout.columns(rows) if callable(layout.columns) else layout.columns
-            empty |= {column.title for column in columns} - set().union(*rows)
-    assert empty <= LEFT_EMPTY

@@ -165,7 +165,7 @@ def test_a_solver_is_timed_while_it_computes(monkeypatch, wall, processor, expec
 def test_a_copy_moves_as_many_bytes_as_it_says(monkeypatch):
     sizes = []
     monkeypatch.setattr(np, "copyto", lambda to, source: sizes.append(to.nbytes + source.nbytes))
-    case = copying(WORK, 1600, passes=3, operations=10)
+    case = copying(WORK, 1600, 3)
     case.prepare()()
     assert (sizes, case.moved, case.solver) == ([1600] * 3, 4800, LIMIT)
 

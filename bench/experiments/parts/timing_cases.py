@@ -391,7 +391,7 @@ def solving(work: TimedWork, problem: ClothSwing) -> TimedCase:
     """
     factor = global_factor(problem.system, problem.h)
     assert isinstance(factor, CholeskyFactor)
-    return copying(work, 8 * factor.entries, passes=2 * ITERATIONS)
+    return copying(work, 8 * factor.entries, 2 * ITERATIONS)
 
 
 LOCAL_GLOBAL = f"implicit Euler, {ITERATIONS} local-global iterations"
@@ -413,23 +413,22 @@ WORKS: dict[str, tuple[Starter, dict[str, Starter]]] = {
 }
 
 
-def copying(work: TimedWork, size: int, *, passes: int = 1, operations: int = 1) -> TimedCase:
+def copying(work: TimedWork, size: int, passes: int) -> TimedCase:
     """Return a yardstick of memory: copies that read and write as many bytes, half and half.
 
     Each pass moves `size` bytes, from as near a cache as the bytes of the work.
     """
-    prepare = partial(_copies, size // 16, passes)
-    return TimedCase(work, LIMIT, prepare, operations, moved=size * passes)
 
+    def prepare() -> Callable[[], None]:
+        source, sink = np.ones(size // 16), np.zeros(size // 16)
 
-def _copies(numbers: int, passes: int) -> Callable[[], None]:
-    source, sink = np.ones(numbers), np.zeros(numbers)
+        def run() -> None:
+            for _ in range(passes):
+                np.copyto(sink, source)
 
-    def run() -> None:
-        for _ in range(passes):
-            np.copyto(sink, source)
+        return run
 
-    return run
+    return TimedCase(work, LIMIT, prepare, moved=size * passes)
 
 
 def streaming(
