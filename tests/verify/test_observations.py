@@ -11,8 +11,10 @@ from observed_programs import PROGRAMS
 
 from plumbob.reference import rotation
 from plumbob.text.sentence import sentence
+from plumbob.verify import fault_programs
 from plumbob.verify.case import Case
 from plumbob.verify.exchange import Answer, Failure, FailureKind
+from plumbob.verify.fault_programs import source_of
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, TaskReport, Verdict
@@ -24,10 +26,13 @@ from plumbob.verify.observe import (
     inputs,
     observations,
     separation,
+    spring_law,
     springs,
 )
 from plumbob.verify.observe.equalities import Equalities
 from plumbob.verify.observe.separation import ElementTable
+from plumbob.verify.screen import drawing
+from plumbob.verify.screen import spring_law as drawn_law
 from plumbob.verify.verify import DISCIPLINES, verify
 
 FORWARD, INVERSE = "forward_kinematics", "inverse_kinematics"
@@ -305,6 +310,34 @@ def test_what_particles_show_is_not_said_of_cases_again():
     found = springs.spring_evidence(spring_judgements(faster), 2.0**-52)
     assert found.tables["particles"].is_right
     assert "whole" not in found.tables
+
+
+LAWS = {
+    "0.5 * k * (length**3 / rest**2 - length)": "of the fourth order",
+    "k * rest * np.log(length / rest)": "the logarithm of the stretch",
+    "3 * k * (length**2 - rest**2)": "3 k (l² - r²)",
+    "k * max(length - rest, 0.0)": "they resist no compression",
+    "k * (length - rest)": None,
+    "1.7 * k * (length - rest)": None,
+}
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_law_of_springs_is_measured_and_drawn(law):
+    source = source_of("forces").replace("k * (length - rest)", law)
+    connection = fault_programs.connection_to(source)
+    cases = observations.spring_cases(FORCES, connection.greeting, 0)
+    answers = ((case, connection.answer(case)) for case in cases)
+    judgements = [CaseJudgement(case, answer, WRONG_FINDING, {}) for case, answer in answers]
+    words = [s.sentence for s in springs.spring_evidence(judgements, 2.0**-52).statements]
+    curve = spring_law.law_in(words)
+    assert (curve is not None) is (LAWS[law] is not None)
+    if curve is not None:
+        assert LAWS[law] in str(words[0])
+        rows = drawn_law.rows(curve)
+        assert rows[0].count("o") + rows[0].count(".") > 0  # the strongest pull
+        assert max(map(len, rows)) <= 1 + drawn_law.COLUMNS
+        assert "<path" in drawing.law_svg(curve, "law")
 
 
 def test_pins_and_rest_count_for_neither_side():

@@ -29,6 +29,7 @@ from .pulls import (
     solve_pulls,
 )
 from .separation import MIN_CASES, TOLERANCE, ElementTable, Findings, Statement, words_of
+from .spring_law import law_words
 
 # An equation needs so many springs more than it has terms to have three terms.
 SPRINGS_FOR_THREE = 25
@@ -49,7 +50,7 @@ def spring_evidence(
     Dampers count as none unless the step is damped.
     """
     cases = [SpringCase(judgement, epsilon, is_damped) for judgement in judgements]
-    cases = [case for case in cases if _is_finite(case)]
+    cases = [case for case in cases if _is_told(case)]
     evidence = Findings({}, [], [])
     solved: dict[str, list[Pulls]] = defaultdict(list)
     residuals: dict[tuple[str, str], dict[str, FloatArray]] = defaultdict(dict)
@@ -81,9 +82,11 @@ def _pull(solved: Sequence[Pulls]) -> bool:
     return len(solved) >= MIN_CASES and any(np.abs(part.pulls).max() > 1e-9 for part in solved)
 
 
-def _is_finite(case: SpringCase) -> bool:
+def _is_told(case: SpringCase) -> bool:
+    """Return whether a case has numbers, and no springs that may be slack."""
     outputs = (case.end, case.end_v, case.forces)
-    return all(values is None or bool(np.isfinite(values).all()) for values in outputs)
+    is_finite = all(values is None or bool(np.isfinite(values).all()) for values in outputs)
+    return is_finite and not case.problem.tension_only.any()
 
 
 # The equation of motion
@@ -149,6 +152,9 @@ def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
     max_terms = 3 if len(pulls) > SPRINGS_FOR_THREE else 2
     fitted = fit(pulls, terms, max_terms) if _pull(solved) else []
     right = _right_pulls(name, terms)
+    is_elastic = ~np.concatenate([part.features["damped_spring"] for part in solved])
+    is_along = not name.startswith("rest") and fitted != []
+    law = law_words(pulls, terms, is_elastic, count) if is_along else None
     if fitted is not None and any(is_sum(fitted, due) for due in right):
         evidence.right.append(sentence("what springs pull ({count})", count=len(pulls)))
     elif fitted == []:
@@ -156,6 +162,8 @@ def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
             "Springs pull nothing {place} ({count} springs of {cases} cases).", **count
         )
         evidence.statements.append(_of_fit(words))
+    elif law is not None:
+        evidence.statements.append(_of_fit(law))
     elif fitted is not None:
         evidence.statements.append(_of_fit(sentence(
             "Every spring pulls {formula} {place}; right is {right} (k: stiffness, l: length, r: "

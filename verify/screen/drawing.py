@@ -14,6 +14,7 @@ from mpl_toolkits.mplot3d.proj3d import proj_transform
 
 from plumbob.reference.arguments import FloatArray
 
+from ..observe.spring_law import SpringLaw
 from .comparison import CaseDrawing, Wireframe
 
 # Differences below the first share of the extent are magnified to about the second.
@@ -58,6 +59,20 @@ def svg(drawing: CaseDrawing, title: str) -> Markup:
                           color=_COLOURS["faint"])  # fmt: skip
     marks = _upright(points["marks"])
     axes.plot(*marks.T, "+", color=_COLOURS["ink"], markersize=11, clip_on=False)
+    return Markup(_to_text(figure, title))
+
+
+def law_svg(law: SpringLaw, title: str) -> Markup:
+    """Return what springs pull at each length as points, beside a line for the linear law."""
+    figure = Figure(figsize=(6.4, 3.2))
+    axes: Any = figure.add_subplot(facecolor="none")
+    ends = law.stretches[[0, -1]]
+    axes.plot(ends, ends - 1.0, color=_COLOURS["blue"], linewidth=3.0, alpha=0.55)
+    axes.plot(*law, "o", color=_COLOURS["orange"], markersize=4)
+    axes.set_xlabel("l/r", color=_COLOURS["ink"])
+    axes.tick_params(colors=_COLOURS["faint"])
+    for spine in axes.spines.values():
+        spine.set_color(_COLOURS["rule"])
     return Markup(_to_text(figure, title))
 
 

@@ -10,6 +10,7 @@ from plumbob.text import html
 from plumbob.text.sentence import Sentence, sentence
 
 from ..judgement import Report, TaskReport
+from ..observe.spring_law import law_in
 from ..task import TASKS
 from . import comparison, drawing, words
 from .words import Presentation
@@ -27,6 +28,7 @@ WORDS = {
     "theirs": sentence("yours"),
     "ours": sentence("expected"),
     "numbers": sentence("Numbers side by side"),
+    "law": sentence("What your springs pull over k r, at each l/r, beside l/r - 1"),
     "again": sentence("The case is saved. To run it again:"),
     "cases": sentence("All cases"),
     "case": sentence("case"),
@@ -58,6 +60,7 @@ def render(report: Report, context: Presentation) -> str:
 def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
     """Return the fields of a task's section."""
     failure, picture, caption = task.smallest_failure, None, None
+    law = law_in(task.diagnosis.observations)
     if failure and (shapes := comparison.drawing_of(failure)):
         larger, factor = drawing.magnified(shapes)
         picture = drawing.svg(larger, words.title(task))
@@ -79,6 +82,7 @@ def _task(task: TaskReport, context: Presentation) -> dict[str, Any]:
         "speed": words.speed(task, context.say),
         "explanations": list(words.explanations(task)) if failure else words.reservations(task),
         "failure": failure,
+        "law": drawing.law_svg(law, context.say(WORDS["law"])) if law else None,
         "drawing": picture,
         "apart": caption,
         "rows": comparison.rows(failure, _ROWS) if failure else [],

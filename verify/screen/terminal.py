@@ -14,7 +14,8 @@ from plumbob.text.printable import harmless, visible
 from plumbob.text.sentence import Say, Sentence, sentence, without_repetition
 
 from ..judgement import CaseJudgement, Report, TaskReport, Verdict, smallest_failures
-from . import comparison
+from ..observe.spring_law import law_in
+from . import comparison, spring_law
 from .words import (
     GOOD,
     VERDICTS,
@@ -114,6 +115,10 @@ def _details(task: TaskReport, context: Presentation, texts: set[str]) -> list[s
     failures.sort(key=lambda other: other.verdict, reverse=True)
     words = [without_repetition(words, texts) for words in explanations(task)]
     rows = paragraphs(words, say, "  ")
+    law = law_in(task.diagnosis.observations)
+    if law:
+        rows += paragraphs([spring_law.caption(law)], say, "  ")
+        rows += [f"    {row}" for row in spring_law.rows(law)]
     for other in failures:
         rows += _failing(task, other, len(failures), say)
     rows += numbers(failures[-1], say)

@@ -1,0 +1,39 @@
+"""What springs pull at each length, drawn in letters beside the linear law."""
+
+import numpy as np
+
+from plumbob.text.sentence import Sentence, sentence
+
+from ..observe.spring_law import SpringLaw
+
+# The size of the drawing on a terminal.
+COLUMNS, ROWS = 48, 9
+# The marks of a measured pull, of the linear law, and of both at one place.
+MEASURED, LINEAR, BOTH = "o", ".", "8"
+
+
+def caption(law: SpringLaw) -> Sentence:
+    """Return what the drawing in letters shows."""
+    return sentence(
+        "What your springs pull over k r (o), beside l/r - 1 (.), for l/r from {first:.2f} to "
+        "{last:.2f}:",
+        first=law.stretches[0], last=law.stretches[-1],
+    )  # fmt: skip
+
+
+def rows(law: SpringLaw) -> list[str]:
+    """Return the rows of a drawing in letters, the strongest pull at the top."""
+    grid = np.full((ROWS, COLUMNS), " ")
+    x = np.linspace(law.stretches[0], law.stretches[-1], COLUMNS)
+    columns = np.rint(np.interp(law.stretches, x, np.arange(COLUMNS))).astype(int)
+    pulls = np.concatenate([law.pulls, x - 1.0])
+    low, high = float(pulls.min()), float(pulls.max())
+
+    linear, measured = (
+        np.rint((ROWS - 1) * (high - values) / (high - low)).astype(int)
+        for values in (x - 1.0, law.pulls)
+    )
+    grid[linear, np.arange(COLUMNS)] = LINEAR
+    for row, column in zip(measured, columns, strict=True):
+        grid[row, column] = MEASURED if grid[row, column] in (" ", MEASURED) else BOTH
+    return ["|" + "".join(row).rstrip() for row in grid]
