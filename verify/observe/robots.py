@@ -22,7 +22,7 @@ from ..kinematics.robot_motions import TASK as TRACK
 from ..kinematics.trajectories import AT_LIMIT, EXACT, LENIENT, Trajectory
 from .fits import fit, formula, is_sum
 from .joints import sound_cases
-from .separation import ElementTable, Findings, Statement
+from .separation import ElementTable, Findings, Statement, separation
 
 TASKS = (robot_targets.TASK, TRACK, robot_jacobian.TASK, robot_velocity.TASK)
 # Fewer answers, frames or joints say nothing.
@@ -48,6 +48,8 @@ def robot_evidence(task: str, judgements: Sequence[CaseJudgement]) -> Findings:
         motions = [_motion(j) for j in answered if _is_finite(j)]
         words = [words for observe in OBSERVATIONS for words in observe(motions)]
         tables |= _joint_tables(motions, sound_cases(judgements))
+    # without a place the verdicts say as much
+    tables = {name: t for name, t in tables.items() if t.is_right or separation(t) is not None}
     return Findings(tables, [Statement(float(i), w, True) for i, w in enumerate(words)], [])
 
 
