@@ -4,14 +4,15 @@ from functools import partial
 
 import numpy as np
 
-from plumbob.reference import Skeleton, forward_kinematics, solve_ik
+from plumbob.reference import Outcome, Skeleton, forward_kinematics, solve_ik
 from plumbob.reference.explicit import symplectic_euler
+from plumbob.reference.formats import urdf
 from plumbob.reference.implicit_euler import ImplicitEuler
 from plumbob.reference.skeleton import Pose
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.kinematics.limits import solve_within
-from plumbob.verify.kinematics.robot_inverse_kinematics import solve_by_reference
+from plumbob.verify.kinematics.robot_models import target_of
 from plumbob.verify.kinematics.robot_motions import followed
 from plumbob.verify.mass_spring.model import Integrator, StepModel, simulate
 from plumbob.verify.mass_spring.problem import problem_of, state_of, system_of
@@ -86,6 +87,20 @@ def solved(solver, /, parents, offsets, method, **inputs):
         return {"local_rotations": solve_within(solver, request)}
     solution = solve_ik(Skeleton(parents, offsets), solver=solver, **inputs)
     return {"local_rotations": solution.local_rotations, "positions": solution.positions}
+
+
+def solve_by_reference(solver, /, **inputs):
+    """Return the result of a solver of the reference on the request's URDF."""
+    robot = urdf.parse(inputs["urdf"]).articulation
+    links = [robot.names.index(f"link_{joint}") for joint in range(len(inputs["start"]))]
+    coordinates = [robot.coordinates_of(link).start for link in links]
+    start = np.empty(robot.coordinate_count)
+    start[coordinates] = inputs["start"]
+    target = target_of(inputs)._replace(effector="tool")
+    options = {name: inputs[name] for name in ("tolerance", "tolerance_rotation", "max_iterations")}
+    solution = solve_ik(robot, start, target, solver, restarts=0, **options)
+    converged = bool(solution.outcome == Outcome.CONVERGED)
+    return {"q": solution.coordinates[coordinates], "converged": converged}
 
 
 def tracked(**inputs):

@@ -4,6 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from honest_solvers import solve_by_reference
 from kinematics_solvers import explained
 
 from plumbob.crosscheck.engines import MujocoRobot
@@ -14,40 +15,40 @@ from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.kinematics import robot_models, robot_targets
-from plumbob.verify.kinematics.robot_inverse_kinematics import (
-    TASK,
-    judge,
-    solve_by_reference,
-)
-from plumbob.verify.kinematics.robot_models import tool_pose
-from plumbob.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE
+from plumbob.verify.kinematics.robot_inverse_kinematics import TASK, cases, judge
+from plumbob.verify.kinematics.robot_models import solved, tool_pose
+from plumbob.verify.kinematics.robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE
 from plumbob.verify.verify import judge_cases
 
 GREETING = Greeting(PROTOCOL, (TASK,), name="robots")
-SOLVERS = ("levenberg_marquardt", "damped_least_squares")
 
 
 @cache
 def all_cases():
-    return robot_targets.cases(GREETING, "", 0, False)
+    return cases(GREETING, "", 0, False)
 
 
 def few_cases():
     """Return the cases of two robots, without their targets anywhere."""
-    return [
-        case for case in all_cases()
-        if case.name.startswith(("two", "seven")) and case.family != robot_targets.ANYWHERE
-    ]  # fmt: skip
+    names = ("two", "seven")
+    return [c for c in all_cases() if c.name.startswith(names) and c.family != ANYWHERE]
 
 
-def near_cases():
-    return [case for case in all_cases() if case.family in (robot_targets.AT, CLOSE)]
-
-
-def judged(function, cases=None):
-    cases = few_cases() if cases is None else cases
+def judged(function, cases):
     return judge_cases(FunctionConnection({TASK: function}, GREETING), TASK, "", cases)
+
+
+def exchange_of(case, q, **claims):
+    answer = Answer({"q": q, **claims}, 0.0)
+    return Exchange(case, answer, answer)
+
+
+def solution(case, **limits):
+    """Return the reference's coordinates, with other limits of all joints."""
+    inputs = case.inputs
+    robot = {**inputs, **{name: np.full(len(inputs["start"]), x) for name, x in limits.items()}}
+    tool = Pose(inputs["target_position"], inputs["target_rotation"])
+    return solved(robot, inputs["start"], tool)[0]
 
 
 def broken(report):
@@ -57,7 +58,7 @@ def broken(report):
 @pytest.mark.usefixtures("verdict_alone")
 def test_a_right_solver_is_right_or_stuck_somewhere():
     cases = few_cases()[::3]
-    report = judged(lambda **inputs: solve_by_reference(SOLVERS[1], **inputs), cases)
+    report = judged(lambda **inputs: solve_by_reference("damped_least_squares", **inputs), cases)
     assert report.verdict <= Verdict.RIGHT_EXCEPT
     assert broken(report) == set()
     assert len(report.judgements) == len(cases) > 6
@@ -69,9 +70,7 @@ def test_angle_beyond_its_limits_by_whole_turns_is_said_to_be(turns, is_wrapped)
     q = 0.5 * (case.inputs["lower"] + case.inputs["upper"])
     joint = int(np.argmin(case.inputs["slides"]))
     q[joint] = case.inputs["upper"][joint] + 0.1 if turns == 0.3 else q[joint] + turns * 2.0 * np.pi
-    answer = Answer({"q": q}, 0.0)
-    exchanges = [Exchange(case, answer, answer)]
-    (judgement,) = judge(exchanges, GREETING, "").judgements
+    (judgement,) = judge([exchange_of(case, q)], GREETING, "").judgements
     limits = next(finding for finding in judgement.findings if finding.law == "limits kept")
     assert limits.verdict is Verdict.WRONG
     assert ("whole turns" in str(limits.sentence)) is is_wrapped
@@ -114,34 +113,19 @@ def test_kinematics_are_those_of_the_same_text_by_the_reference_and_by_mujoco(nu
     np.testing.assert_allclose(theirs.matrices[0], matrix, atol=1e-12)
 
 
-def exchange_of(case, q, **claims):
-    answer = Answer({"q": q, **claims}, 0.0)
-    return Exchange(case, answer, answer)
-
-
 def test_limits_that_are_kept_only_after_the_solve_break_a_law():
-    limited = [case for case in all_cases() if case.family == AT_A_LIMIT]
     exchanges = []
-    for case in limited[:4]:
-        free = {name: np.full(7, x) for name, x in (("lower", -9.0), ("upper", 9.0))}
-        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
-        q, _ = robot_models.solved({**case.inputs, **free}, case.inputs["start"], tool)
-        clamped = np.clip(q, case.inputs["lower"], case.inputs["upper"])
+    for case in [case for case in all_cases() if case.family == AT_A_LIMIT][:4]:
+        free = solution(case, lower=-9.0, upper=9.0)
+        clamped = np.clip(free, case.inputs["lower"], case.inputs["upper"])
         exchanges.append(exchange_of(case, clamped))
-        right, is_reached = robot_models.solved(case.inputs, case.inputs["start"], tool)
-        assert is_reached
-        laws = judge([exchange_of(case, right)], GREETING, "")
-        assert broken(laws) == set()
+        assert broken(judge([exchange_of(case, solution(case))], GREETING, "")) == set()
     assert "limits in the solve" in broken(judge(exchanges, GREETING, ""))
 
 
 def test_failure_at_the_target_alone_says_what_divides_by_zero():
-    near = near_cases()
-    exchanges = []
-    for case in near:
-        tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
-        q, _ = robot_models.solved(case.inputs, case.inputs["start"], tool)
-        exchanges.append(exchange_of(case, q, converged=case.family == CLOSE))
+    near = [case for case in all_cases() if case.family in (AT, CLOSE)]
+    exchanges = [exchange_of(c, solution(c), converged=c.family == CLOSE) for c in near]
     report = explained(TASK, exchanges, GREETING)
     assert report.verdict is Verdict.RIGHT_EXCEPT
     assert "0 / 0" in str([words for one in report.judgements for words in one.complaints])

@@ -6,9 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference import Outcome, solve_ik
 from plumbob.reference.arguments import FloatArray
-from plumbob.reference.formats import urdf
 from plumbob.reference.judging import PoseJudgement
 
 from ..case import Case
@@ -18,7 +16,7 @@ from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import robot_targets, rounding
 from .report import report
-from .robot_models import FARTHEST, judgement_of, target_of
+from .robot_models import FARTHEST, judgement_of
 from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
 from .trajectories import Trajectory, is_falling_at, limit_laws, trajectories
 
@@ -132,17 +130,3 @@ def _limits(judgement: PoseJudgement, q: FloatArray, case: Case, greeting: Greet
     is_wrappable = not case.inputs["slides"][joint] and lower - bound <= angle <= upper + bound
     key = "limits kept, not wrapped" if is_wrappable else "limits kept"
     return finding(key, excess[joint], bound, index=joint, value=float(q[joint]), angle=angle)
-
-
-def solve_by_reference(solver: str, /, **inputs: Any) -> Mapping[str, Any]:
-    """Return the result of a solver of the reference on the request's URDF."""
-    robot = urdf.parse(inputs["urdf"]).articulation
-    links = [robot.names.index(f"link_{joint}") for joint in range(len(inputs["start"]))]
-    coordinates = [robot.coordinates_of(link).start for link in links]
-    start = np.empty(robot.coordinate_count)
-    start[coordinates] = inputs["start"]
-    target = target_of(inputs)._replace(effector="tool")
-    options = {name: inputs[name] for name in ("tolerance", "tolerance_rotation", "max_iterations")}
-    solution = solve_ik(robot, start, target, solver, restarts=0, **options)
-    converged = bool(solution.outcome == Outcome.CONVERGED)
-    return {"q": solution.coordinates[coordinates], "converged": converged}

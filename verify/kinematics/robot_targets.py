@@ -134,7 +134,7 @@ def _requests(
     ]
     answer = max(answers, key=lambda q: np.linalg.svd(jacobian(mechanism(robot), q, -1))[1].min())
     close = np.clip(answer + rng.uniform(-NEAR, NEAR, joints), lower, upper)
-    anywhere = rng.uniform(lower, upper)
+    anywhere = np.asarray(rng.uniform(lower, upper))
     tool = tool_pose(robot, answer)
     unreachable = tool._replace(positions=np.array([0.6, 0.0, 0.8]) * 1.5 * size_of(robot))
     yield ToolRequest(AT, robot, answer, tool)
