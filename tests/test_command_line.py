@@ -119,34 +119,6 @@ def test_a_path_of_another_kind_exits_2_and_is_named(capsys, empty_folder, comma
     assert (code, err) == (2, f"plumbob: {path}: expected a {expected}, got a {kind}\n")
 
 
-DEEP = "[" * 10**5 + "]" * 10**5
-NESTED = {
-    "setting": ('"operations": 1', f'"operations": {DEEP}'),
-    "machine": ('"stamp": {}', f'"stamp": {{"machine": {DEEP}}}'),
-    "array": ("1.0, 1.0", f"1.0, {DEEP}"),
-    "later format": ('{"format": 4,', f'{{"format": 5, "more": {DEEP},'),
-    "unknown field": ('{"format": 4,', f'{{"format": 4, "more": {DEEP},'),
-}
-
-
-@pytest.mark.parametrize(("part", "nested"), NESTED.values(), ids=NESTED)
-@pytest.mark.parametrize("arguments", [["report"], ["records", "list"]], ids=" ".join)
-def test_a_line_nested_without_end_costs_itself(capsys, empty_folder, arguments, part, nested):
-    file = RecordFile("out")
-    file.append([a_record()])
-    line = file.path.read_text()
-    file.path.write_text(line + line.replace(part, nested))
-    code, out, err = plumbob(capsys, *arguments, "out")
-    assert (code, err) == (0, "")
-    if arguments == ["report"]:
-        assert "Left out of records.jsonl, for they are no records: line 2 (" in out
-    file.path.write_text(line.replace(part, nested))
-    code, out, err = plumbob(capsys, *arguments, "out")
-    assert (code, out) == (2, "")
-    assert err.startswith("plumbob: out/records.jsonl, line 1: not a record (")
-    assert err.count("\n") == 1
-
-
 def test_a_folder_of_superseded_records_says_so(capsys):
     RecordFile("out").append([a_record(superseded="other settings")])
     code, _, err = plumbob(capsys, "report", "out")

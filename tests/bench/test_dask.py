@@ -105,24 +105,15 @@ def test_an_address_of_no_executor_is_misuse(monkeypatch, capsys, address, words
     assert words in capsys.readouterr().err
 
 
-OTHERS = {
-    "nobody": (None, "got no answer of one within 0.5 s"),
-    "silence": (b"", "got no answer of one within 0.5 s"),
-    "garbage": (b"garbage " * 1000, "got no answer of one within 0.5 s"),
-    "zeros": (bytes(8000), "got no answer of one within 0.5 s"),
-    "HTTP": (b"HTTP/1.0 400 Bad Request\r\n\r\n", "got no answer of one within 0.5 s"),
-}
+OTHERS = {"zeros": bytes(8000), "nobody": None, "silence": b"", "garbage": b"garbage " * 1000}
+OTHERS["HTTP"] = b"HTTP/1.0 400 Bad Request\r\n\r\n"
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(one, marks=[] if one == "zeros" else pytest.mark.slow)
-     for one in OTHERS],
-)  # fmt: skip
-def test_another_server_at_the_address_is_misuse(name):
+@pytest.mark.sample("zeros")
+@pytest.mark.parametrize("answer", OTHERS.values(), ids=OTHERS)
+def test_another_server_at_the_address_is_misuse(answer):
     """A Client waits for its answer for ever, so that this one has a process of its own."""
     pytest.importorskip("distributed", reason=INSTALLED)
-    answer, why = OTHERS[name]
     with socket.create_server(("127.0.0.1", 0)) as server, contextlib.ExitStack() as ends:
         address = f"127.0.0.1:{server.getsockname()[1]}"
         if answer is None:
@@ -139,7 +130,8 @@ def test_another_server_at_the_address_is_misuse(name):
         )
         command, options = [sys.executable, "-c", program], {"capture_output": True, "text": True}
         done = subprocess.run(command, cwd=ROOT, check=True, timeout=90, **options)
-    assert done.stdout == f"dask://{address}: expected a Dask scheduler, {why}\n"
+    why = "expected a Dask scheduler, got no answer of one within 0.5 s"
+    assert done.stdout == f"dask://{address}: {why}\n"
     assert not done.stderr
 
 

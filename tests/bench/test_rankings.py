@@ -169,16 +169,6 @@ def test_a_clean_sweep_of_one_kind_is_told_beside_the_other_kind(make):
     )
 
 
-def test_bold_times_are_those_of_the_first_by_the_paired_test(make):
-    """Medians that differ on paper may tie."""
-    noise = 1e-6 * np.random.default_rng(0).lognormal(0.0, 0.5, (2, 9, 3))
-    records = [make.timed(s, 1.0).with_measured(seconds=n)
-               for s, n in zip(("Pinocchio", "MuJoCo"), noise, strict=True)]  # fmt: skip
-    (ranking,) = rankings(timing.kinematics(Results(records)))
-    assert ranking.leader is None
-    assert ranking.first == {"Pinocchio", "MuJoCo"}
-
-
 def test_a_motion_tells_its_frames_and_who_computes_in_single_precision(make):
     near = {"error": [np.inf, 5e-3, 1e-3], "frames": [2]}
     solvers = ("Newton engine, semi-implicit", "Plumbob symplectic Euler")

@@ -142,6 +142,9 @@ DAMAGED = {
     "deep": b"[" * 100_000, "deep and whole": b"[" * 100_000 + b"]" * 100_000,
     "deep array": with_text(("measured", "residual"), b"[" * 300 + b"]" * 300),
     "very deep array": with_text(("measured", "residual"), b"[" * 10**5 + b"]" * 10**5),
+    "deep setting": with_text(("settings", "tolerance"), b"[" * 10**5 + b"]" * 10**5),
+    "deep machine": with_text(("stamp", "machine"), b"[" * 10**5 + b"]" * 10**5),
+    "deep unknown field": with_text(("more",), b"[" * 10**5 + b"]" * 10**5),
     "a lone surrogate": changed(("solver",), "\ud800"), "no UTF-8": b'{"format": 4, "\xff": 1}',
     "NaN": changed(("size",), float("nan")), "infinity": changed(("size",), float("inf")),
     "beyond floats": with_text(("size",), b"1e999"),
@@ -304,10 +307,14 @@ def test_a_line_of_the_wrong_type_is_refused_by_its_number(swing, file, part, na
     assert why in sentence
 
 
-def test_a_measurement_of_another_type_is_a_failure():
-    wrong = replace(BLOCK, measure=lambda: {"time": TIMES, "left": 1.0})
-    assert measure(wrong).failed == "ValueError: expected 1 dimensions, got 0 - at `left`"
-    assert not measure(replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT})).failed
+@pytest.mark.parametrize(("changes", "why"), [
+    ({}, ""),
+    ({"left": 1.0}, "ValueError: expected 1 dimensions, got 0 - at `left`"),
+    ({"lift": 1.0}, "ValueError: measured: expected values that Swing declares, got lift"),
+])  # fmt: skip
+def test_a_measurement_of_another_type_or_name_is_a_failure(changes, why):
+    measured = {"time": TIMES, "left": LEFT, **changes}
+    assert measure(replace(BLOCK, measure=lambda: measured)).failed == why
 
 
 def test_a_setting_is_not_read_as_an_array_of_the_same_name():
@@ -323,12 +330,6 @@ def test_scalars_of_numpy_are_numbers():
     fields = {"subject": "kinematics", "group": "g", "work": "w", "seconds": np.ones((1, 1))}
     block = Block("timing", "p", "copy", lambda: {**fields, "moved": np.float64(3.0)})
     assert measure(block).values.moved == 3.0
-
-
-def test_a_misspelt_number_or_word_is_a_failure():
-    misspelt = replace(BLOCK, measure=lambda: {"time": TIMES, "left": LEFT, "lift": 1.0})
-    why = "ValueError: measured: expected values that Swing declares, got lift"
-    assert measure(misspelt).failed == why
 
 
 @pytest.mark.parametrize("notes", [{"failed": "no memory"}, {"remark": "not installed"}])

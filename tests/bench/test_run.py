@@ -125,6 +125,9 @@ OTHER = {
         "another machine (processor abacus, now {processor})"),
     "size": ({}, {"size": 1}, "a larger size (1, now 2)"),
     "failure": ({}, {"notes": {"failed": "no"}}, "it failed before"),
+    "files": ({}, {"facts": {"digest": "old"}}, "other sources of a (old, now none)"),
+    "problem": ({}, {"facts": {"problem_digest": "old"}}, "p is another problem now"),
+    "settings": ({}, {"facts": {"superseded": "then"}}, "its settings are asked for again"),
 }  # fmt: skip
 
 

@@ -230,7 +230,7 @@ def test_a_missed_claim_is_said_first(tmp_path):
 @pytest.mark.parametrize("command", command_names.COMMANDS)
 def test_help_is_no_wider_than_the_terminal(capsys, monkeypatch, command):
     full = None
-    for width in (200, *range(40, 121, 10)):
+    for width in (200, 40, 57, 80, 100):
         monkeypatch.setenv("COLUMNS", str(width))
         assert cli.run_command([*command.split(), "--help"]) == 0
         out = capsys.readouterr().out

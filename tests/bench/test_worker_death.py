@@ -168,8 +168,12 @@ STARTS = {
 }
 
 
-@pytest.mark.parametrize("load", [0, 2**22], ids=["small", "larger than the buffer of a pipe"])
-@pytest.mark.parametrize("manner", STARTS)
+LARGE = 2**22  # more than the buffer of a pipe
+
+
+@pytest.mark.parametrize(
+    ("manner", "load"), [*((manner, 0) for manner in STARTS), ("kill", LARGE), ("hang", LARGE)]
+)
 def test_a_death_before_the_job_is_read_is_a_sentence(jobs, monkeypatch, manner, load):
     monkeypatch.setattr(isolation, "_START", STARTS[manner])
     with closing(WorkerProcess()) as worker:

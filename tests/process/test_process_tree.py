@@ -127,6 +127,7 @@ def test_what_runs_is_seen(tmp_path, monkeypatch, columns):
     assert not running(tmp_path)
 
 
+@pytest.mark.sample("9")
 @pytest.mark.parametrize(
     "end", ["os._exit(0)", "os.kill(os.getpid(), 9)", "os.kill(os.getpid(), 15)"]
 )
