@@ -15,16 +15,17 @@ from ..exchange import Answer, Connection, Failure, FailureKind, is_hung
 from ..greeting import Greeting
 from ..judgement import CaseJudgement, TaskReport, Verdict
 from ..kinematics import forward_kinematics, problems
-from ..mass_spring import forces
+from ..mass_spring import energy, forces
 from ..mass_spring.cases import UNDAMPED
 from ..mass_spring.cases import telling_cases as spring_cases
 from . import inputs, robots
 from .joints import forward_evidence, inverse_evidence, sound_cases
 from .separation import ElementTable, Findings, Statement, joined, separation
+from .spring_law import energy_law
 from .springs import spring_evidence
 
 STEP = "mass_spring_step"
-OF_SPRINGS = (forces.TASK, STEP)
+OF_SPRINGS = (forces.TASK, energy.TASK, STEP)
 TASKS = (forward_kinematics.TASK, problems.TASK, *OF_SPRINGS, *robots.TASKS)
 # Fewer cases let chance speak: of 5 random cases 27 % of the statements were false on all cases.
 # Requests about springs that are not counted, 20 or more, may make up for cases without an answer.
@@ -161,5 +162,8 @@ def _evidence(
         return robots.robot_evidence(report.task, judgements)
     if report.task == problems.TASK:
         return inverse_evidence(report, judgements, {*unread})
+    if report.task == energy.TASK:
+        law = energy_law(judgements)
+        return Findings({}, [] if law is None else [Statement(0.0, law, True)], [])
     is_damped = greeting.step.damper not in UNDAMPED
     return spring_evidence(judgements, greeting.epsilon, sound_cases(judgements), is_damped)

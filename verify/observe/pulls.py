@@ -161,7 +161,7 @@ class Pulls(NamedTuple):
     pulls: FloatArray  # of the acting springs [N]
     gravity: FloatArray | None  # [m/s²], None if taken from the request
     terms: Mapping[str, FloatArray]  # by symbols
-    features: Mapping[str, BoolArray]
+    is_elastic: BoolArray  # which springs have no damper
 
 
 def solve_pulls(case: SpringCase, reading: ForceReading) -> Pulls | None:
@@ -186,9 +186,5 @@ def solve_pulls(case: SpringCase, reading: ForceReading) -> Pulls | None:
     solution: FloatArray = np.asarray(least_squares, dtype=float)
     if rank < A.shape[1] or not np.abs(A @ solution - b).max() <= allowed:
         return None
-    features = {
-        "damped_spring": reading.c > 0.0,
-        "compressed_spring": reading.first_length < reading.r,
-    }
     gravity = solution[count:] if is_measured else None
-    return Pulls(case, solution[:count], gravity, reading.terms(), features)
+    return Pulls(case, solution[:count], gravity, reading.terms(), reading.c == 0.0)

@@ -9,6 +9,9 @@ import numpy as np
 from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
+from ..exchange import Answer
+from ..judgement import CaseJudgement
+from ..mass_spring.problem import frames, problem_of
 from .fits import RIGHT, Term, formula
 from .separation import TOLERANCE, words_of
 
@@ -26,15 +29,26 @@ LAWS: Mapping[str, Any] = {
     "k (l - r)²": lambda s: s.k * (s.l - s.r) * np.abs(s.l - s.r),
     "k max(l - r, 0)": lambda s: s.k * np.maximum(s.l - s.r, 0.0),
 }
+# The energies of these laws.
+ENERGIES: Mapping[str, Any] = {
+    "k r² (l²/r² - 1)²/8": lambda s: s.k * s.r**2 * (s.l**2 / s.r**2 - 1.0) ** 2 / 8.0,
+    "k (l² - r²)²/4": lambda s: s.k * (s.l**2 - s.r**2) ** 2 / 4.0,
+    "k r² log(l/r)²/2": lambda s: 0.5 * s.k * s.r**2 * np.log(s.l / s.r) ** 2,
+    "k log(l/r)²/2": lambda s: 0.5 * s.k * np.log(s.l / s.r) ** 2,
+    "k (l/r - 1)²/2": lambda s: 0.5 * s.k * (s.l / s.r - 1.0) ** 2,
+    "k max(l - r, 0)²/2": lambda s: 0.5 * s.k * np.maximum(s.l - s.r, 0.0) ** 2,
+    "k l²/2": lambda s: 0.5 * s.k * s.l**2,
+}
 # A law is measured at so many lengths, of stretched and of compressed springs.
 MIN_LENGTHS = 6
 
 
 class SpringLaw(NamedTuple):
-    """What springs pull at their lengths; a right spring pulls l/r - 1 in these units."""
+    """What springs pull at their lengths over k r, or their energies over k r²."""
 
     stretches: FloatArray  # l/r, ascending
-    pulls: FloatArray  # over k r
+    measured: FloatArray
+    linear: FloatArray  # of right springs, l/r - 1 or (l/r - 1)²/2
 
 
 def law_words(
@@ -49,21 +63,60 @@ def law_words(
     elastic = elastic & (k > 0.0) & (terms["k r"] > 0.0)
     pulls, k = pulls[elastic], k[elastic]
     s = SimpleNamespace(k=k, l=terms["k l"][elastic] / k, r=terms["k r"][elastic] / k)
-    is_both = bool((s.l > s.r).any() and (s.l < s.r).any())
-    for symbol, rule in LAWS.items() if is_both and len(k) >= MIN_LENGTHS else ():
-        values = rule(s)
-        factor = float(values @ pulls / (values @ values))
-        if np.abs(pulls - factor * values).max() <= TOLERANCE * np.abs(pulls).max():
-            factor = 1.0 if abs(factor - 1.0) <= RIGHT else factor
-            order = np.argsort(s.l / s.r)
-            curve = SpringLaw((s.l / s.r)[order], (pulls / (k * s.r))[order])
-            return sentence(
-                "Its springs follow another law: {law}. Each pulls {formula} {place}; right is "
-                "k (l - r) (k: stiffness, l: length, r: rest length; {count} springs of {cases} "
-                "cases, solved from the answers).",
-                law=words_of("law", symbol), formula=formula([Term(factor, symbol)]), curve=curve,
-                **{**count, "count": len(k)})  # fmt: skip
+    match = _match(pulls, s, LAWS)
+    if match is None:
+        return None
+    return sentence(
+        "Its springs follow another law: {law}. Each pulls {formula} {place}; right is k (l - r) "
+        "(k: stiffness, l: length, r: rest length; {count} springs of {cases} cases, solved from "
+        "the answers).",
+        law=words_of("law", match.symbol), formula=formula([match]),
+        curve=_curve(pulls / (k * s.r), s.l / s.r, s.l / s.r - 1.0),
+        **{**count, "count": len(k)})  # fmt: skip
+
+
+def energy_law(judgements: Sequence[CaseJudgement]) -> Sentence | None:
+    """Return which law the answered energies of single springs follow, None if a right or none."""
+    problems = [(problem_of(j.case.inputs), j.answer) for j in judgements]
+    single = [
+        (p, float(answer.values["elastic"]))
+        for p, answer in problems
+        if isinstance(answer, Answer) and "elastic" in answer.values and len(p.springs) == 1
+    ]
+    single = [(p, energy) for p, energy in single if p.stiff and p.rest_lengths[0]]
+    values = np.array([energy for _, energy in single])
+    if not values.any():
+        return None
+    k, r = (
+        np.array([getattr(p, n)[0] for p, _ in single]) for n in ("stiffnesses", "rest_lengths")
+    )
+    s = SimpleNamespace(k=k, r=r, l=np.array([frames(p, p.positions)[0][0] for p, _ in single]))
+    match = _match(values, s, ENERGIES)
+    if match is None:
+        return None
+    stretches = s.l / s.r
+    return sentence(
+        "Its springs follow another law: the elastic energy of each is {formula}; right is "
+        "k (l - r)²/2 (k: stiffness, l: length, r: rest length; {count} cases of one spring).",
+        formula=formula([match]), count=len(k),
+        curve=_curve(values / (k * r**2), stretches, 0.5 * (stretches - 1.0) ** 2),
+    )  # fmt: skip
+
+
+def _match(values: FloatArray, springs: Any, laws: Mapping[str, Any]) -> Term | None:
+    """Return the law of springs k, l, r that has some values, with a factor; None if none has."""
+    is_both = bool((springs.l > springs.r).any() and (springs.l < springs.r).any())
+    for symbol, rule in laws.items() if is_both and len(values) >= MIN_LENGTHS else ():
+        column = rule(springs)
+        factor = float(column @ values / (column @ column))
+        if np.abs(values - factor * column).max() <= TOLERANCE * np.abs(values).max():
+            return Term(1.0 if abs(factor - 1.0) <= RIGHT else factor, symbol)
     return None
+
+
+def _curve(measured: FloatArray, stretches: FloatArray, linear: FloatArray) -> SpringLaw:
+    order = np.argsort(stretches)
+    return SpringLaw(stretches[order], measured[order], linear[order])
 
 
 def law_in(observations: Sequence[Sentence]) -> SpringLaw | None:

@@ -28,15 +28,13 @@ from .pulls import (
     readings_of,
     solve_pulls,
 )
-from .separation import MIN_CASES, TOLERANCE, ElementTable, Findings, Statement, words_of
+from .separation import MIN_CASES, TOLERANCE, ElementTable, Findings, Statement
 from .spring_law import law_words
 
 # An equation needs so many springs more than it has terms to have three terms.
 SPRINGS_FOR_THREE = 25
 # A gravity is constant if it differs by less between answers [m/s²], requests by more.
 SAME_GRAVITY, OTHER_GRAVITY = 1e-4, 0.1
-# Of which springs the pull may differ from that of the others.
-KINDS = ("damped_spring", "compressed_spring")
 
 
 def spring_evidence(
@@ -152,7 +150,7 @@ def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
     max_terms = 3 if len(pulls) > SPRINGS_FOR_THREE else 2
     fitted = fit(pulls, terms, max_terms) if _pull(solved) else []
     right = _right_pulls(name, terms)
-    is_elastic = ~np.concatenate([part.features["damped_spring"] for part in solved])
+    is_elastic = np.concatenate([part.is_elastic for part in solved])
     is_along = not name.startswith("rest") and fitted != []
     law = law_words(pulls, terms, is_elastic, count) if is_along else None
     if fitted is not None and any(is_sum(fitted, due) for due in right):
@@ -170,8 +168,12 @@ def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
             "rest length, c: damping; {count} springs of {cases} cases, solved from the answers).",
             formula=formula(fitted), right=formula([Term(c, s) for s, c in right[0].items()]),
             **count)))  # fmt: skip
-    else:
-        _add_kinds(solved, pulls, terms, count, evidence)
+    elif count["place"] in (READINGS["forces"], READINGS["start"]):
+        # at the end of a step iterations may not have converged: then no sum is exact
+        words = sentence(
+            "What springs pull {place} is along them, but no sum of few terms such as k l, k r and "
+            "c dl/dt ({count} springs of {cases} cases).", **count)  # fmt: skip
+        evidence.statements.append(Statement(5.0, words, is_exact=False))
     _add_gravity(solved, evidence)
 
 
@@ -186,37 +188,6 @@ def _right_pulls(name: str, terms: Mapping[str, FloatArray]) -> list[Mapping[str
 
 def _of_fit(words: Sentence) -> Statement:
     return Statement(0.0, words, is_exact=True)
-
-
-def _add_kinds(
-    solved: Sequence[Pulls],
-    pulls: FloatArray,
-    terms: Mapping[str, FloatArray],
-    count: Mapping[str, Any],
-    evidence: Findings,
-) -> None:
-    """Add the sums of springs with and without a feature, or that there is no plain sum."""
-    cases = np.concatenate([np.full(len(part.pulls), i) for i, part in enumerate(solved)])
-    for kind in KINDS:
-        mask = np.concatenate([part.features[kind] for part in solved])
-        sides = [mask, ~mask]
-        if min(len({*cases[side]}) for side in sides) < MIN_CASES:
-            continue
-        sums = [fit(pulls[s], {key: t[s] for key, t in terms.items()}, 3) for s in sides]
-        if sums[0] and sums[1] and sums[0] != sums[1]:
-            words = sentence(
-                "Springs pull {formula} {kind}, elsewhere {other}, {place} (k: stiffness, l: "
-                "length, r: rest length, c: damping; {count} springs of {cases} cases).",
-                formula=formula(sums[0]), other=formula(sums[1]),
-                kind=words_of("feature", kind), **count)  # fmt: skip
-            evidence.statements.append(_of_fit(words))
-            return
-    # at the end of a step iterations may not have converged: then no sum is exact
-    if count["place"] in (READINGS["forces"], READINGS["start"]):
-        words = sentence(
-            "What springs pull {place} is along them, but no sum of few terms such as k l, k r and "
-            "c dl/dt ({count} springs of {cases} cases).", **count)  # fmt: skip
-        evidence.statements.append(Statement(5.0, words, is_exact=False))
 
 
 def _add_gravity(solved: Sequence[Pulls], evidence: Findings) -> None:

@@ -63,12 +63,11 @@ def svg(drawing: CaseDrawing, title: str) -> Markup:
 
 
 def law_svg(law: SpringLaw, title: str) -> Markup:
-    """Return what springs pull at each length as points, beside a line for the linear law."""
+    """Return what springs pull or store at each length as points, beside the linear law's line."""
     figure = Figure(figsize=(6.4, 3.2))
     axes: Any = figure.add_subplot(facecolor="none")
-    ends = law.stretches[[0, -1]]
-    axes.plot(ends, ends - 1.0, color=_COLOURS["blue"], linewidth=3.0, alpha=0.55)
-    axes.plot(*law, "o", color=_COLOURS["orange"], markersize=4)
+    axes.plot(law.stretches, law.linear, color=_COLOURS["blue"], linewidth=3.0, alpha=0.55)
+    axes.plot(law.stretches, law.measured, "o", color=_COLOURS["orange"], markersize=4)
     axes.set_xlabel("l/r", color=_COLOURS["ink"])
     axes.tick_params(colors=_COLOURS["faint"])
     for spine in axes.spines.values():

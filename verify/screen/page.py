@@ -28,7 +28,7 @@ WORDS = {
     "theirs": sentence("yours"),
     "ours": sentence("expected"),
     "numbers": sentence("Numbers side by side"),
-    "law": sentence("What your springs pull over k r, at each l/r, beside l/r - 1"),
+    "law": sentence("Your springs (points) beside right ones (line), by the stretch l/r"),
     "again": sentence("The case is saved. To run it again:"),
     "cases": sentence("All cases"),
     "case": sentence("case"),

@@ -15,8 +15,7 @@ MEASURED, LINEAR, BOTH = "o", ".", "8"
 def caption(law: SpringLaw) -> Sentence:
     """Return what the drawing in letters shows."""
     return sentence(
-        "What your springs pull over k r (o), beside l/r - 1 (.), for l/r from {first:.2f} to "
-        "{last:.2f}:",
+        "Your springs (o) beside right ones (.), for l/r from {first:.2f} to {last:.2f}:",
         first=law.stretches[0], last=law.stretches[-1],
     )  # fmt: skip
 
@@ -26,12 +25,13 @@ def rows(law: SpringLaw) -> list[str]:
     grid = np.full((ROWS, COLUMNS), " ")
     x = np.linspace(law.stretches[0], law.stretches[-1], COLUMNS)
     columns = np.rint(np.interp(law.stretches, x, np.arange(COLUMNS))).astype(int)
-    pulls = np.concatenate([law.pulls, x - 1.0])
-    low, high = float(pulls.min()), float(pulls.max())
+    right = np.interp(x, law.stretches, law.linear)
+    values = np.concatenate([law.measured, right])
+    low, high = float(values.min()), float(values.max())
 
     linear, measured = (
         np.rint((ROWS - 1) * (high - values) / (high - low)).astype(int)
-        for values in (x - 1.0, law.pulls)
+        for values in (right, law.measured)
     )
     grid[linear, np.arange(COLUMNS)] = LINEAR
     for row, column in zip(measured, columns, strict=True):
