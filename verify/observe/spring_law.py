@@ -41,6 +41,8 @@ ENERGIES: Mapping[str, Any] = {
 }
 # A law is measured at so many lengths, of stretched and of compressed springs.
 MIN_LENGTHS = 6
+# Longer springs would hide the shape of the law near rest, where most springs are.
+LONGEST_DRAWN = 2.0
 
 
 class SpringLaw(NamedTuple):
@@ -116,6 +118,8 @@ def _match(values: FloatArray, springs: Any, laws: Mapping[str, Any]) -> Term | 
 
 def _curve(measured: FloatArray, stretches: FloatArray, linear: FloatArray) -> SpringLaw:
     order = np.argsort(stretches)
+    shown = order[stretches[order] <= LONGEST_DRAWN]
+    order = shown if len(shown) >= MIN_LENGTHS else order
     return SpringLaw(stretches[order], measured[order], linear[order])
 
 
