@@ -306,6 +306,33 @@ def test_sums_need_two_time_steps_and_two_gravities(change, is_said):
     assert any("Velocities are" in str(statement.sentence) for statement in found) is is_said
 
 
+def falling(substeps, weight):
+    """Return a step of particles that only fall, by symplectic substeps."""
+
+    def step(positions, velocities, masses, gravity, h, **request):
+        x, v = positions, velocities
+        for _ in range(substeps):
+            v = v + h / substeps * weight(masses)[:, None] * gravity
+            x = x + h / substeps * v
+        return {"positions": x, "velocities": v}
+
+    return step
+
+
+@pytest.mark.parametrize(
+    ("weight", "declared", "flight"),
+    [(np.ones_like, 4, None), (np.ones_like, 1, "= h v + 5/8 h² g;"),
+     (lambda masses: masses, 4, "= h v + 5/8 h² m g;")],
+)  # fmt: skip
+def test_a_flight_is_right_by_the_declared_substeps(weight, declared, flight):
+    judgements = spring_judgements(falling(4, weight))
+    found = springs.spring_evidence(judgements, 2.0**-52, substeps=declared)
+    flights = [str(s.sentence) for s in found.statements if "x' - x =" in str(s.sentence)]
+    assert len(flights) == (flight is not None)
+    assert all(flight in words for words in flights)
+    assert any("Velocities are" in str(s.sentence) for s in found.statements) is (declared == 1)
+
+
 def test_what_particles_show_is_not_said_of_cases_again():
     found = springs.spring_evidence(spring_judgements(faster), 2.0**-52)
     assert found.tables["particles"].is_right

@@ -166,4 +166,5 @@ def _evidence(
         law = energy_law(judgements)
         return Findings({}, [] if law is None else [Statement(0.0, law, True)], [])
     is_damped = greeting.step.damper not in UNDAMPED
-    return spring_evidence(judgements, greeting.epsilon, sound_cases(judgements), is_damped)
+    substeps, sound = greeting.step.substeps or 1, sound_cases(judgements)
+    return spring_evidence(judgements, greeting.epsilon, sound, is_damped, substeps)

@@ -42,10 +42,11 @@ def spring_evidence(
     epsilon: float,
     sound: Set[str] = frozenset(),
     is_damped: bool = True,
+    substeps: int = 1,
 ) -> Findings:
     """Return what answers show; `sound` are the names of the cases with a right verdict.
 
-    Dampers count as none unless the step is damped.
+    Dampers count as none unless the step is damped. A step declares so many substeps.
     """
     cases = [SpringCase(judgement, epsilon, is_damped) for judgement in judgements]
     cases = [case for case in cases if _is_told(case)]
@@ -70,8 +71,8 @@ def spring_evidence(
     linearised = linearised_pulls(cases) if not evidence.statements else None
     if linearised is not None and not linearised[1]:
         evidence.statements.append(_of_fit(linearised[0]))
-    _add_flights([case for case in cases if not case.acting.any()], evidence)
-    _add_velocities(cases, evidence)
+    _add_flights([case for case in cases if not case.acting.any()], evidence, substeps)
+    _add_velocities(cases, evidence, substeps)
     return evidence
 
 
@@ -232,8 +233,9 @@ def _differ(cases: Sequence[SpringCase]) -> bool:
     return len(gs) > 1 and (len(hs) > 1 or all(case.forces is not None for case in cases))
 
 
-def _add_flights(cases: Sequence[SpringCase], evidence: Findings) -> None:
+def _add_flights(cases: Sequence[SpringCase], evidence: Findings, substeps: int) -> None:
     """Add what moves free particles without springs."""
+    declared = [{"h v": 1.0, "h² g": share} for share in _gravity_shares(substeps)]
     if not _differ(cases):
         return
     for name, quantity, symbols, dues in FLIGHTS:
@@ -242,7 +244,7 @@ def _add_flights(cases: Sequence[SpringCase], evidence: Findings) -> None:
         fitted = _sum_of(cases, quantity, symbols)
         if fitted is None:
             continue
-        if any(is_sum(fitted, due) for due in dues):
+        if any(is_sum(fitted, due) for due in (*dues, *declared)):
             words = sentence("{name} without springs ({count} cases)", name=name, count=len(cases))
             evidence.right.append(words)
             continue
@@ -257,6 +259,8 @@ TERMS: Mapping[str, Any] = {
     "h v": lambda c: c.h * c.v,
     "h² g": lambda c: c.h**2 * c.gravity,
     "h g": lambda c: c.h * c.gravity,
+    "h² m g": lambda c: c.h**2 * c.masses * c.gravity,
+    "h m g": lambda c: c.h * c.masses * c.gravity,
     "v": lambda c: c.v,
     "g": lambda c: c.gravity,
     "h² v": lambda c: c.h**2 * c.v,
@@ -272,7 +276,7 @@ TERMS: Mapping[str, Any] = {
     "(x' - x)/h²": lambda c: (c.end - c.x) / c.h**2,
 }
 OF_FORCES = ("m g", "g", "m² g", "m (0, 1, 0)")
-OF_MOTION = tuple(TERMS)[:10]
+OF_MOTION = tuple(TERMS)[:12]
 OF_VELOCITIES = ("(x' - x)/h", "v", "h g", "x' - x", "(x' - x)/h²", "g", "h (0, 1, 0)")
 # What free particles may be moved by: quantity, terms and right sums, the usual sum first.
 FLIGHTS: Sequence[tuple[str, Any, Sequence[str], Sequence[Mapping[str, float]]]] = (
@@ -283,7 +287,12 @@ FLIGHTS: Sequence[tuple[str, Any, Sequence[str], Sequence[Mapping[str, float]]]]
 )  # fmt: skip
 
 
-def _add_velocities(cases: Sequence[SpringCase], evidence: Findings) -> None:
+def _gravity_shares(substeps: int) -> Sequence[float]:
+    """Return what gravity adds to free flights over h² g, symplectic and explicit substeps."""
+    return [(substeps + 1.0) / (2.0 * substeps), (substeps - 1.0) / (2.0 * substeps)]
+
+
+def _add_velocities(cases: Sequence[SpringCase], evidence: Findings, substeps: int) -> None:
     """Add of which differences of positions and old velocities the new ones are a sum."""
     cases = [c for c in cases if c.end is not None and c.end_v is not None and len(c.free)]
     cases = [case for case in cases if not case.problem.external.any()]
@@ -292,6 +301,9 @@ def _add_velocities(cases: Sequence[SpringCase], evidence: Findings) -> None:
     fitted = _sum_of(cases, lambda c: c.end_v, OF_VELOCITIES)
     if fitted is None:
         return
+    share = _gravity_shares(substeps)[0]
+    if substeps > 1 and is_sum(fitted, {"(x' - x)/h": 1.0 / share, "v": 1.0 - 1.0 / share}):
+        return  # as a constant force leaves them after symplectic substeps
     if is_sum(fitted, {"(x' - x)/h": 1.0}):
         evidence.right.append(sentence("v' = (x' - x)/h ({count} cases)", count=len(cases)))
     elif sum(map(_has_other_velocities, cases)) >= MIN_CASES:
