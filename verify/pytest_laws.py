@@ -1,6 +1,6 @@
 """Laws of a Python solver as a parametrised test for pytest."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any
 
@@ -9,7 +9,7 @@ from plumbob.text.printable import harmless, visible
 from .connections.host import PythonSolver
 from .disciplines import DISCIPLINES
 from .functions import FunctionConnection
-from .judgement import LEAST_SHARE, TaskReport, Verdict
+from .judgement import TaskReport, Verdict
 from .message import decode_greeting
 from .verify import judge_cases, trials
 
@@ -42,12 +42,7 @@ def laws(
         import pytest
     except ImportError:
         raise ImportError("laws: expected pytest to be installed; pip install pytest") from None
-    if (solver is None) == (not functions):
-        raise ValueError("laws: expected a module or functions by name, got both or neither")
-    declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
-    name = getattr(solver, "__name__", "") or "solver"
-    offered = PythonSolver(functions if solver is None else solver, name, declared)
-    connection = FunctionConnection(offered.functions, decode_greeting(offered.greeting))
+    connection = _connection_to(solver, functions)
     groups = {
         (task, method): DISCIPLINES[task].cases(connection.greeting, method, seed, thorough)
         for task, method in trials(connection.greeting)
@@ -68,6 +63,18 @@ def laws(
     return test_law
 
 
+def _connection_to(
+    solver: object, functions: Mapping[str, Callable[..., Any]]
+) -> FunctionConnection:
+    """Return a module or functions as a connection; raise ValueError of both or neither."""
+    if (solver is None) == (not functions):
+        raise ValueError("laws: expected a module or functions by name, got both or neither")
+    declared = functions.get("PLUMBOB") or getattr(solver, "PLUMBOB", None) or {}
+    name = getattr(solver, "__name__", "") or "solver"
+    offered = PythonSolver(functions if solver is None else solver, name, declared)
+    return FunctionConnection(offered.functions, decode_greeting(offered.greeting))
+
+
 def _check(report: TaskReport, name: str) -> None:
     """Fail if a case is not right; skip an undecided case."""
     import pytest
@@ -80,6 +87,6 @@ def _check(report: TaskReport, name: str) -> None:
     if judgement.verdict is Verdict.UNDECIDED:
         pytest.skip("; ".join(map(str, judgement.complaints)) or "nobody can tell")
     if judgement.verdict > Verdict.UNDECIDED:
-        likely = [e.sentence for e in report.diagnosis.explanations if e.share >= LEAST_SHARE]
+        likely = [explanation.sentence for explanation in report.diagnosis.explanations]
         lines = map(visible, map(str, [*judgement.complaints, *likely]))
         pytest.fail("\n".join(map(harmless, lines)), pytrace=False)

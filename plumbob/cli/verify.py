@@ -2,8 +2,8 @@
 
 import os
 import sys
-from collections.abc import Callable, Iterable
-from contextlib import ExitStack
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -87,51 +87,54 @@ def verify(  # noqa: PLR0913 -- one parameter an option
     3 if Plumbob itself failed at a task and the other tasks are right.
     """
     if schema:
-        from plumbob.verify.schema import text
+        return _print_schema()
+    with _starting() as bar:
+        from plumbob.text.language import language_of
+        from plumbob.verify.connections.command import CaseOptions, limits
+        from plumbob.verify.screen.files import Files
+        from plumbob.verify.screen.words import Presentation, speaker
 
-        return _print([text()])
+        language = language_of(lang)
+        folder = ["--answers", str(answers)] if answers else []
+        words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
+        options = CaseOptions(tuple(task or ()), rerun, thorough, seed)
+        shown = Presentation(speaker(language), language, words)
+        if names or template or export:
+            finish = partial(_list, options, names, template, export, shown.say)
+        elif self_test:
+            finish = partial(_self_test, [*words, *options.tasks], shown.say)
+        else:
+            files = Files(json, junit, html, output)
+            finish = _judge(shown, limits(time_limit, memory_limit), options, files, bar)
+    return finish()
+
+
+@contextmanager
+def _starting() -> Iterator[Any]:
+    """Show the progress of imports and of the judge, which take seconds, on a bar."""
     # Solver and reference are timed on a thread each; NumPy is not imported yet.
     from plumbob.process.child import one_thread
 
     os.environ |= {**one_thread(), **os.environ}
     from .terminal import lines_in_a_pipe, progress
 
-    with ExitStack() as work:  # imports take seconds, on a busy machine many
-        bar = work.enter_context(progress())
-        work.enter_context(lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)))
+    with progress() as bar, lines_in_a_pipe(bar, (LINE_PAUSE, LINE_PAUSE)):
         bar.add_task("starting", total=None)
-        from plumbob.text.language import language_of
-        from plumbob.verify.connections.command import ANSWERS, CaseOptions, limits
-        from plumbob.verify.screen.files import Files
-        from plumbob.verify.screen.words import Presentation, speaker
-
-        language = language_of(lang)
-        options = CaseOptions(tuple(task or ()), rerun, thorough, seed)
-        if names or template or export:
-            work.close()
-            return _print(_listed(options, names, template, export, speaker(language)))
-        folder = [ANSWERS, str(answers)] if answers else []
-        words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
-        if self_test:
-            work.close()
-            return _self_test([*words, *options.tasks], speaker(language))
-        files = Files(json, junit, html, output)
-        presentation = Presentation(speaker(language), language, words)
-        finish = _judge(presentation, limits(time_limit, memory_limit), options, files, bar)
-    return finish()
+        yield bar
 
 
-def _listed(
+def _list(
     options: "CaseOptions", names: bool, template: str | None, export: Path | None, say: "Say"
-) -> Iterable[str]:
-    """Return lines on the tasks, or on the starter or cases to write."""
+) -> int:
+    """Print the tasks, or write a starter or cases and print what to do next."""
     from plumbob.verify.screen import listings
 
     if template and not names:
-        return listings.starter(template, Path(), say)
+        return _print(listings.starter(template, Path(), say))
     if export and not names:
-        return listings.exported(export, options.tasks, options.seed, options.thorough, say)
-    return listings.described(options.tasks, say)
+        cases = options.tasks, options.seed, options.thorough
+        return _print(listings.exported(export, *cases, say))
+    return _print(listings.described(options.tasks, say))
 
 
 def _judge(
@@ -206,6 +209,12 @@ def _publisher(
 def _print(lines: Iterable[str]) -> int:
     print("\n".join(lines))
     return SUCCESS
+
+
+def _print_schema() -> int:
+    from plumbob.verify.schema import text
+
+    return _print([text()])
 
 
 def _self_test(words: list[str], say: "Say") -> int:
