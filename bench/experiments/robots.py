@@ -336,7 +336,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ..figures.chart import Panel, Series, declared_chart, series
-from ..figures.robot_map import draw_maps, robot_maps
 from ..figures.sketch import Sketch
 from ..measure import metrics
 from ..measure.metrics import Floats
@@ -545,18 +544,11 @@ def _chart(
     panels = [
         Panel(robot, tuple(curves(field) if field else ())) for robot, field in fields_shown.items()
     ]
-    every = [score for members in fields.values() for score in members]
-    chart = _declared(name, every[0].start if every else "")
+    start = next((score.start for members in fields.values() for score in members), "")
     sample = scores.sample([score for field in fields_shown.values() for score in field])
-    title = f"{chart['title']} ({sample})"
-    return declared_chart({**chart, "title": title}, panels, results.user_solvers)
-
-
-def _declared(name: str, start: str) -> dict[str, Any]:
-    """Return the declared parts of a figure, its name and title with a start."""
-    chart = CAPTIONS.figure(name)
-    title = f"Robots, {start}: {chart['title']}"
-    return {**chart, "name": f"{name}_{start.replace(' ', '_')}", "title": title}
+    chart, name = CAPTIONS.figure(name), f"{name}_{start.replace(' ', '_')}"
+    title = f"Robots, {start}: {chart['title']} ({sample})"
+    return declared_chart({**chart, "name": name, "title": title}, panels, results.user_solvers)
 
 
 def _share(score: Score, x: Floats, shares: Floats, bounds: tuple[Floats, Floats]) -> Series:
@@ -565,16 +557,9 @@ def _share(score: Score, x: Floats, shares: Floats, bounds: tuple[Floats, Floats
     return series(score.solver, x, 100 * shares, (100 * low, 100 * high))
 
 
-def heat_map(start: str, results: Results) -> Sketch | None:
-    """Return both maps for a start beside each other; None without solvers."""
-    maps = robot_maps(results, start)
-    chart = _declared("robots_map", start)
-    return Sketch(**chart, data=maps, draw=draw_maps) if maps else None
-
-
 # Portfolios have no charts of each robot: the page would be half as large again.
 FIGURES: tuple[Figure, ...] = (
-    *(partial(draw, start) for draw in (group_budgets, heat_map) for start in STARTS),
+    *(partial(group_budgets, start) for start in STARTS),
     *(
         partial(draw, start)
         for draw in (budgets, performance_profiles)

@@ -1,18 +1,12 @@
 """Maps of solvers and robots: the share solved and the time of each, as in the tables."""
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from ..ranking.scores import PENALTY, STARTS, Score, fields_of
 from ..tables.columns import extent_in_words, words_in
 from ..tables.results import Results, grouped
 from ..tables.table import percent
-from .style import COLOURS, plain_label
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure as Canvas
 
 # The quantities of a map; so many times the shortest time is drawn as the palest.
 SOLVED, TIME, SLOWEST = "poses solved", "time", 1000.0
@@ -20,8 +14,6 @@ UNITS_OF_MAPS = {
     SOLVED: "targets solved [%]",
     TIME: f"time, geometric mean [µs], {words_in(PENALTY, 'ms')} where not solved",
 }
-# Maps of more robots than this are stacked.
-MAXIMUM_BESIDE = 5
 
 
 class MapCell(NamedTuple):
@@ -66,11 +58,11 @@ class RobotMap(NamedTuple):
         return any(cell.is_starred for row in self.rows for cell in row.cells if cell)
 
 
-def robot_maps(results: Results, *starts: str) -> list[RobotMap]:
+def robot_maps(results: Results) -> list[RobotMap]:
     """Return a map for each start with solvers and each quantity, solved targets and time."""
     return [
         _map(start, quantity, fields, results)
-        for start in starts or STARTS
+        for start in STARTS
         if (fields := fields_of(results, start))
         for quantity in (SOLVED, TIME)
     ]
@@ -112,33 +104,3 @@ def _time_cell(score: Score) -> MapCell:
 
 def _cell(score: Score, text: str, shade: float) -> MapCell:
     return MapCell(text, round(100 * min(1.0, max(0.0, shade)), 2), not score.is_ranked)
-
-
-def draw_maps(maps: Sequence[RobotMap]) -> "Canvas":
-    """Return maps of the same solvers as a figure of matplotlib's, in the order of the first."""
-    from .canvas import canvas
-
-    solvers, robots = [row.solver for row in maps[0].rows], maps[0].robots
-    rows = 1 if len(robots) <= MAXIMUM_BESIDE else len(maps)
-    figure, axes = canvas(rows * (1.3 + 0.27 * len(solvers)), len(maps) // rows, rows, sharey=True)
-    for ax, robot_map in zip(axes, maps, strict=True):
-        cells = {row.solver: row.cells for row in robot_map.rows}
-        _draw_map(ax, [cells[solver] for solver in solvers], robots)
-        ax.set_title(robot_map.caption)
-    axes[0].set_yticks(range(len(solvers)), [plain_label(solver) for solver in solvers])
-    axes[0].invert_yaxis()
-    return figure
-
-
-def _draw_map(ax: "Axes", rows: Sequence[Sequence[MapCell | None]], robots: Sequence[str]) -> None:
-    cells = ((i, j, *cell) for i, row in enumerate(rows) for j, cell in enumerate(row) if cell)
-    for i, j, text, shade, is_starred in cells:
-        alpha = 0.06 + 0.005 * shade
-        ax.barh(i, 0.96, 0.92, j - 0.48, color=COLOURS["blue"], alpha=alpha, linewidth=0)
-        ax.text(j, i, text + "*" * is_starred, ha="center", va="center", fontsize=8)
-    ax.set(xlim=(-0.5, len(robots) - 0.5), ylim=(-0.5, len(rows) - 0.5))
-    names = [plain_label(robot) for robot in robots]
-    ax.set_xticks(range(len(robots)), names, rotation=25, ha="right", rotation_mode="anchor")
-    ax.tick_params(length=0)
-    ax.grid(visible=False)
-    ax.spines[:].set_visible(False)
