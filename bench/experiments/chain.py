@@ -61,10 +61,10 @@ class ChainSolves(SolveWords, frozen=True):
 
     residual: Floats1  # infinite without a solution
     iterations: Floats1  # NaN where the solver does not report them
-    distance: Floats1  # of the target from the root
-    bend: Floats1  # of the farthest joint from the line from root to target
-    excess: Floats1  # residual above distance - reach
-    reach: float
+    distance: Floats1 | None = None  # of the target from the root
+    bend: Floats1 | None = None  # of the farthest joint from the line from root to target
+    excess: Floats1 | None = None  # residual above distance - reach
+    reach: float | None = None
     solved: Booleans1 | None = None  # whether the residual is within the tolerance
     outcome: Integers1 | None = None  # the number of an `Outcome`, of our solvers
     history_low: Floats1 | None = None  # 10th percentile of the residuals by iteration
@@ -198,8 +198,7 @@ BEYOND_COLUMNS = (
 
 def _straight(record: Record) -> np.ndarray:
     """Return which targets the chain reaches for in a straight line."""
-    solves: ChainSolves = record.values
-    return np.asarray(solves.bend <= STRAIGHT * solves.reach)
+    return np.asarray(record.values.bend <= STRAIGHT * record.values.reach)
 
 
 def _beyond_summary(records: Sequence[Record]) -> Summary:

@@ -241,11 +241,11 @@ def _points(curves: Sequence[ClosedCurve]) -> Iterator[str]:
 def jitter_chart(results: Results) -> Sketch | None:
     """Show the largest rotation of a joint on each curve, from rest and from the last solution."""
     curves = by_problem(results.all("arm", task=CURVE, warm=False))
+    warm = {(r.problem, r.solver): r for r in results.all("arm", task=CURVE, warm=True)}
     spans = []
     for row, records in enumerate(curves.values()):
         for record in records:
-            warm = results.find("arm", record.problem, record.solver, warm=True)
-            motions = [motion for motion in (record, warm) if motion is not None]
+            motions = filter(None, [record, warm.get((record.problem, record.solver))])
             angles = [in_unit(motion.values.largest_angle.max(), "°") for motion in motions]
             spans.append(series(record.solver, angles, [row] * len(angles), form=SPAN))
     rows = tuple(str(records[0].values.curve) for records in curves.values())

@@ -31,6 +31,8 @@ USUAL, SLOW = 10, 1000
 # perturbed by about `PERTURBATION` [m].
 STIFF, PERTURBATION = 1e5, 1e-6
 FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
+# The numbers of a certificate on record.
+_CERTIFIED = ("residual", "distance", "curvature", "lipschitz", "newton_step", "covered")
 # Particles a side, and the number of random targets of a full scale.
 QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
 
@@ -106,17 +108,12 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     return {
         "size": size,
         "iterations": iterations,
-        "residual": certificate.residual,
+        **{name: getattr(certificate, name) for name in _CERTIFIED},
         "at_floor": point.at_floor,
         "balance": balance_residual(problem.system, problem.start, x, problem.h),
-        "distance": certificate.distance,
-        "curvature": certificate.curvature,
-        "lipschitz": certificate.lipschitz,
-        "newton_step": certificate.newton_step,
         "newton_distance": distance,
         "error": newton.exact.error(x, objective.y),
         "above": point.value - newton.minimum,
-        "covered": certificate.covered,
         "same": same is True,
         "different": same is False,
         "coverage": certificate.coverage.name,

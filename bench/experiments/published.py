@@ -14,7 +14,6 @@ from ..measure import metrics
 from ..measure.block import Block, Measured, Scale
 from ..measure.chain_targets import SolverLimits, blocks_of_users
 from ..measure.record import Record
-from ..measure.values import Booleans1, Fact, Floats1, Floats2, Integers1, Values
 from ..peers import catalogue
 from ..peers.ik import toolbox, trac_ik
 from ..peers.peer import ONE_START, RESTARTS, Peer, Run
@@ -23,6 +22,7 @@ from ..problems.chains import TargetsForSkeleton, unit
 from ..problems.evaluate import Tolerance
 from ..problems.robot_targets import uniform_targets
 from ..problems.robots import is_installed
+from .chain import ChainSolves
 from .robots import SUITE, RobotJob, RobotSolves
 
 # The tasks of records.
@@ -39,24 +39,7 @@ _LIMITS: dict[str, Any] = {
 _FAST = (catalogue.PLUMBOB_LM, toolbox.PEER, trac_ik.PEER)
 
 
-class FabrikSolves(Values, frozen=True, kw_only=True):
-    """The iterations of each solve, NaN if not reported, and the remaining distances [m]."""
-
-    stratum: Fact[str]
-    iterations: Floats1
-    residual: Floats1
-    # A user's solver has the other numbers of `ChainSolves` too.
-    distance: Floats1 | None = None
-    bend: Floats1 | None = None
-    excess: Floats1 | None = None
-    reach: float | None = None
-    solved: Booleans1 | None = None
-    claims: Integers1 | None = None
-    seconds: Floats2 | None = None
-    control: Floats1 | None = None
-
-
-KINDS = {TRAC_IK: RobotSolves, TOOLBOX: RobotSolves, FABRIK: FabrikSolves}
+KINDS = {TRAC_IK: RobotSolves, TOOLBOX: RobotSolves, FABRIK: ChainSolves}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:

@@ -10,7 +10,8 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from plumbob.reference.arguments import FloatArray
 
 from ..peers import catalogue
 from .sketch import Sketch
@@ -18,8 +19,6 @@ from .style import Style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Floats = NDArray[np.float64]
 
 # Labelled curves; the others are grey.
 MAX_LABELLED = 6
@@ -50,10 +49,10 @@ class Series(NamedTuple):
     """
 
     solver: str
-    x: Floats
-    y: Floats
-    low: Floats | tuple[()] = ()
-    high: Floats | tuple[()] = ()
+    x: FloatArray
+    y: FloatArray
+    low: FloatArray | tuple[()] = ()
+    high: FloatArray | tuple[()] = ()
     form: str = LINE
 
 

@@ -9,10 +9,10 @@ from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, to_rgba
 from numpy.typing import NDArray
 
+from plumbob.reference.arguments import FloatArray
+
 from .style import COLOURS
 from .view import ARM_VIEW, CLOTH_VIEW, project
-
-Floats = NDArray[np.float64]
 
 LIGHT = np.array([0.4, 0.8, 0.45])
 # From near to far, ever lighter, as in motion.js.
@@ -21,7 +21,7 @@ COLOUR_MAP = LinearSegmentedColormap.from_list(
 )
 
 
-def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
+def draw_arm(ax: Axes, joints: FloatArray, alpha: float = 1.0) -> None:
     """Draw a pose of a chain by the positions of its joints, (joint, 3), and mark its root."""
     x, y, _ = project(joints, ARM_VIEW)
     ax.plot(x, y, "-", color=COLOURS["blue"], alpha=alpha, linewidth=2.4, zorder=3)
@@ -33,9 +33,9 @@ def draw_arm(ax: Axes, joints: Floats, alpha: float = 1.0) -> None:
 
 def draw_cloth(
     ax: Axes,
-    positions: Floats,
+    positions: FloatArray,
     pinned: Sequence[int] | NDArray[np.int64],
-    shares: Floats | None = None,
+    shares: FloatArray | None = None,
 ) -> None:
     """Draw a square cloth by the positions of its particles, (particle, 3), far squares first.
 

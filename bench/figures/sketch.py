@@ -6,7 +6,6 @@ A digest of both is written into the files of a figure; files with the same dige
 import hashlib
 import inspect
 import re
-from collections import OrderedDict
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
@@ -58,17 +57,16 @@ class Sketch:
 
 # The code and the style of all drawings.
 _SOURCES = sorted(Path(__file__).parent.glob("*.*"))
-_cache: OrderedDict[str, tuple[str, bytes]] = OrderedDict()
+_cache: dict[str, tuple[str, bytes]] = {}
 
 
 def drawn(sketch: Sketch, folder: Path | None = None) -> Drawing:
     """Return a sketch drawn, or its files in a folder with the same digest."""
     digest = sketch.digest()
     files = _cache.get(digest) or _read(sketch.name, folder, digest) or _draw(sketch, digest)
+    if len(_cache) == _CACHE_SIZE:
+        _cache.pop(next(iter(_cache)))
     _cache[digest] = files
-    _cache.move_to_end(digest)
-    if len(_cache) > _CACHE_SIZE:
-        _cache.popitem(last=False)
     return Drawing(sketch.name, sketch.title, sketch.shows, *files)
 
 

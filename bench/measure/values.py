@@ -6,7 +6,7 @@ another type, is refused.
 
 import functools
 from collections.abc import Iterable, Mapping
-from typing import Annotated, Any, TypeVar, get_args
+from typing import Annotated, Any, TypeVar, cast, get_args
 
 import msgspec
 import numpy as np
@@ -79,13 +79,14 @@ def array_names(kind: type[Values]) -> set[str]:
 @functools.cache
 def facts_of(kind: type[Values]) -> type[Values]:
     """Return the type of the facts of a block alone."""
-    left_out = number_names(kind) | _names(Values)
+    left_out, field = number_names(kind) | _names(Values), cast(Any, msgspec.field)
     facts = [
-        (f.name, f.type, msgspec.field(default=f.default, default_factory=f.default_factory))
+        (f.name, f.type, field(default=f.default, default_factory=f.default_factory))
         for f in msgspec.structs.fields(kind)
         if f.name not in left_out
     ]
-    return msgspec.defstruct(kind.__name__, facts, bases=(Values,), frozen=True, kw_only=True)
+    facts_only = msgspec.defstruct(kind.__name__, facts, bases=(Values,), frozen=True, kw_only=True)
+    return cast(type[Values], facts_only)
 
 
 def _names(kind: type[Values]) -> set[str]:

@@ -58,11 +58,6 @@ class Results:
         records = [*self.records, *self.failed] if failed else self.records
         return [record for record in records if record.suite == suite and _has(record, facts)]
 
-    def find(self, suite: str, problem: str, solver: str, **facts: Any) -> Record | None:
-        """Return the record of this problem and solver, or None."""
-        records = self.all(suite, **facts)
-        return next((r for r in records if (r.problem, r.solver) == (problem, solver)), None)
-
 
 def _has(record: Record, facts: dict[str, Any]) -> bool:
     properties = {**record.settings, **record.measured}

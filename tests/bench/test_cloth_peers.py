@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from table_cells import column
 
 from plumbob.bench.experiments import Scale
 from plumbob.bench.experiments import cloth_peers as peers_cloth
@@ -484,11 +485,6 @@ def test_a_solver_that_fails_has_no_limit_and_says_why(here):
 
 
 # Tables and figures.
-
-
-def column(table, heading):
-    index = [c.heading for c in table.columns].index(heading)
-    return [row[index] for row in table.rows]
 
 
 def test_the_table_of_one_step_ranks_by_time_to_the_criterion_then_by_error(make):

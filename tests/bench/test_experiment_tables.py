@@ -95,10 +95,6 @@ def test_a_missed_claim_is_named_in_table_and_answer(make):
     assert table.summary.points == ("Missed: damper forces",)
 
 
-def changed(record, **arrays):
-    return record.with_measured(**arrays)
-
-
 def test_chains_are_counted_as_straight_only_if_they_are(make):
     table = beyond_reach(Results([make.beyond("ccd", 0.5), make.beyond("fabrik", 1e-9)]))
     assert column(table, "off the line, largest [m]") == [0.5, 1e-9]
@@ -109,7 +105,7 @@ def test_targets_without_a_solution_are_not_printed_as_infinite(make):
     def unanswered(record, *names, count=1):
         ends = [math.inf] * count
         cut = {name: [*record.measured[name][:-count], *ends] for name in names}
-        return changed(record, **{name: np.array(numbers) for name, numbers in cut.items()})
+        return record.with_measured(**{name: np.array(numbers) for name, numbers in cut.items()})
 
     records = [
         unanswered(make.beyond(solver, 0.004), "residual", "bend", "excess", count=count)
@@ -141,7 +137,7 @@ def test_means_of_iterations_are_compared_on_problems_that_both_solved(records):
 )  # fmt: skip
 def test_iterations_are_fewer_only_where_the_same_targets_say_so(make, ccd, fabrik, counts):
     pair = {"ccd": ccd, "fabrik": fabrik}.items()
-    records = [changed(make.beyond(s, 0.0), iterations=np.array([*c])) for s, c in pair]
+    records = [make.beyond(s, 0.0).with_measured(iterations=np.array([*c])) for s, c in pair]
     numbers = re.findall(r"\d+", rivals(Results(records)).summary.sentence)
     assert "".join(numbers[:4]) == counts  # fewer by FABRIK, problems, fewer by CCD, ties
     assert numbers[4] == "10"
@@ -152,7 +148,9 @@ def test_iterations_are_fewer_only_where_the_same_targets_say_so(make, ccd, fabr
 )
 def test_the_most_targets_met_are_ranked_by_chance(make, ccd, fabrik, first):
     records = [
-        changed(make.drawn(solver, False, 1.0), residual=np.where(np.arange(40) < count, 1.0, 1e-9))
+        make.drawn(solver, False, 1.0).with_measured(
+            residual=np.where(np.arange(40) < count, 1.0, 1e-9)
+        )
         for solver, count in (("ccd", ccd), ("fabrik", fabrik))
     ]
     summary = accuracy(Results(records)).summary

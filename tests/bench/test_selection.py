@@ -140,11 +140,18 @@ def test_all_forms_say_the_same_and_csv_keeps_all_digits():
     assert page.rows == [[nasty], [nasty]]
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory, records):
+    """A folder with a report's records."""
+    folder = tmp_path_factory.mktemp("recorded")
+    RecordFile(folder / "report").append(records)
+    return folder
+
+
 @pytest.fixture
-def folder(tmp_path, records, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    RecordFile(tmp_path / "report").append(records)
-    return tmp_path
+def folder(recorded, monkeypatch):
+    monkeypatch.chdir(recorded)
+    return recorded
 
 
 def run(capsys, *arguments):
