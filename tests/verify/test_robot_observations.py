@@ -143,7 +143,8 @@ WRONG_JACOBIANS = [
     (lambda J, case: J * np.repeat([0.5, 1.0], 3)[:, None], "0.5 in the linear parts"),
     (lambda J, case: J * (np.arange(J.shape[1]) != case.inputs["effector"]),
      "Wrong at the effector and nowhere else: parts of columns"),
-    (lambda J, case: J[[0, 1, 2, 4, 3, 5]], "Wrong in angular parts and nowhere else"),
+    (lambda J, case: J + np.repeat([[0.0], [0.1]], 3, axis=0),
+     "Wrong in angular parts and nowhere else"),
 ]  # fmt: skip
 
 
@@ -154,10 +155,25 @@ def test_the_wrong_part_of_jacobians_is_named(change, words):
     assert words in observed(JACOBIAN, lambda case: {"jacobian": change(right[case.name], case)})
 
 
-def test_what_all_robots_with_wrong_answers_have_is_said():
-    def findings_of(case):
-        is_rotated = (case.inputs["tool_rotation"] != robot_models.IDENTITY).any()
-        return (finding("Jacobian", float(is_rotated), 0.5, index=0),)
+def is_of_rotated_tool(case):
+    return (case.inputs["tool_rotation"] != robot_models.IDENTITY).any()
 
-    text = observed(JACOBIAN, lambda case: {"jacobian": case.inputs["axes"].T}, None, findings_of)
-    assert "Wrong for robots with a rotated tool (tool_rotation) and nowhere else: answers" in text
+
+def is_of_opposite_quaternion(case):
+    tool = robot_models.tool_pose(case.inputs, case.inputs["start"])
+    return tool.rotations @ case.inputs["target_rotation"] < 0.0
+
+
+@pytest.mark.parametrize(
+    ("task", "output", "is_wrong", "words"),
+    [(VELOCITY, "velocities", is_of_rotated_tool, "robots with a rotated tool (tool_rotation)"),
+     (POSE, "q", is_of_opposite_quaternion, "targets whose quaternion is opposite")],
+)  # fmt: skip
+def test_what_all_requests_with_wrong_answers_have_is_said(task, output, is_wrong, words):
+    text = observed(
+        task,
+        lambda case: {output: 0.1 * np.ones(len(case.inputs["axes"]))},
+        findings_of=lambda case: (finding("target reached", float(is_wrong(case)), 0.5),),
+    )
+    assert f"Wrong for {words}" in text
+    assert "and nowhere else: answers" in text

@@ -68,9 +68,20 @@ def test_other_numbers_and_a_convention_that_changes_between_answers_are_not_rig
     assert report.verdict is verdict
 
 
+def by_differences(inputs):
+    """Return right speeds by a Jacobian of differences."""
+    _, twist = right_equation(inputs)
+    return np.linalg.pinv(differences(inputs, 1e-6), 1e-4) @ twist
+
+
+@pytest.mark.parametrize(
+    ("task", "output", "answer"),
+    [(JACOBIAN, "jacobian", lambda inputs: differences(inputs, 1e-6)),
+     (VELOCITY, "velocities", by_differences)],
+)  # fmt: skip
 @pytest.mark.usefixtures("verdict_alone")
-def test_differences_of_poses_are_a_jacobian_of_fewer_digits():
-    report = report_of(JACOBIAN, "jacobian", lambda inputs: differences(inputs, 1e-6))
+def test_differences_of_poses_are_a_jacobian_of_fewer_digits(task, output, answer):
+    report = report_of(task, output, answer)
     assert report.verdict is Verdict.RIGHT_EXCEPT
 
 

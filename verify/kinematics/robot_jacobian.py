@@ -18,7 +18,7 @@ from ..judgement import Finding, TaskReport, Verdict
 from ..laws import digits, judge_case, not_finite, of_joints
 from . import rounding
 from .report import report
-from .robot_models import Inputs, any_pose, mechanism, robots, tool_pose
+from .robot_models import DIFFERENCES, Inputs, any_pose, mechanism, robots, tool_pose
 from .skeletons import suits
 
 TASK = "robot_jacobian"
@@ -104,7 +104,8 @@ def _best_convention(
     matches: dict[str, dict[str, bool]] = {name: {} for name in CONVENTIONS}
     for exchange in exchanges:
         if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values:
-            bound = _bound(exchange.case, greeting)
+            differences = DIFFERENCES * exchange.case.facts["size"]
+            bound = max(_bound(exchange.case, greeting), differences)
             for name, convention in CONVENTIONS.items():
                 gap = _gap(exchange, right_jacobian(exchange.case.inputs, convention))
                 matches[name][exchange.case.name] = gap <= bound
@@ -131,4 +132,6 @@ def _findings(
         yield not_finite("numbers, of a joint", answer.sum(axis=0))
         return
     errors = np.abs(answer - J).max(axis=0)
-    yield of_joints("Jacobian", errors, _bound(case, greeting))
+    is_difference = errors.max() <= DIFFERENCES * case.facts["size"]
+    key = "Jacobian, by differences" if is_difference else "Jacobian"
+    yield of_joints(key, errors, _bound(case, greeting))

@@ -33,6 +33,9 @@ TOLERANCES = {"double": 1e-5, "single": 1e-3}
 REDUNDANT = 7
 # Angles of the robot of seven hinges, bent so that no singular value of its Jacobian is small.
 BENT = np.array([0.3, -0.6, 0.2, 1.2, -0.3, 0.9, 0.4])
+# Differences of poses leave so much of a Jacobian's entry unknown, relative to the robot's size:
+# forward ones 1e-8 of a second derivative with the best step, with most steps ten times that.
+DIFFERENCES = 1e-7
 # Larger coordinates are clipped to this: the reference takes none beyond 1e75.
 FARTHEST = 1e74
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])

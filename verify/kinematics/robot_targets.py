@@ -209,11 +209,12 @@ def _draw_limited(robot: Inputs, rng: np.random.Generator) -> ToolRequest | None
     J = jacobian(mechanism(robot), start, -1)
     is_spare = (np.diag(np.linalg.pinv(J) @ J) < SHARE) & ~robot["slides"]
     joint = int(np.argmax(np.abs(changes) * is_spare))
+    if not is_spare[joint]:
+        return None
     side = "upper" if changes[joint] > 0.0 else "lower"
     limited = _limited(robot, side, joint, start[joint] + 0.3 * changes[joint])
     solvers = ("levenberg_marquardt", "damped_least_squares")
-    results = [solved(limited, start, target, solver) for solver in solvers]
-    is_solvable = is_spare[joint] and all(is_reached for _, is_reached in results)
+    is_solvable = all(solved(limited, start, target, solver)[1] for solver in solvers)
     return ToolRequest(AT_A_LIMIT, limited, start, target) if is_solvable else None
 
 

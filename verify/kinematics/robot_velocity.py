@@ -20,7 +20,7 @@ from ..judgement import CaseJudgement, Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import rounding
 from .report import report
-from .robot_models import Inputs, any_pose, mechanism, robots
+from .robot_models import DIFFERENCES, Inputs, any_pose, mechanism, robots
 from .skeletons import suits
 
 TASK = "robot_velocity"
@@ -165,9 +165,12 @@ def _findings(
     nearest, damping = solving(equation, speeds)
     loss = float(np.linalg.norm(J @ speeds - twist) / np.linalg.norm(twist))
     is_damped = np.abs(nearest - speeds).max() <= bound and (is_singular or loss <= LARGEST_LOSS)
-    key = "velocity of the tool, damped" if is_damped else "velocity of the tool"
-    verdict = Verdict.RIGHT_EXCEPT if is_singular else None
     error = float(np.abs(J @ speeds - twist).max())
+    differences = DIFFERENCES * case.facts["size"] * max(1.0, float(np.abs(speeds).max()))
+    key = "velocity of the tool"
+    if is_damped or error <= differences:
+        key += ", damped" if is_damped else ", by differences"
+    verdict = Verdict.RIGHT_EXCEPT if is_singular else None
     yield finding(key, error, bound, verdict=verdict, damping=damping, loss=loss)
 
 

@@ -58,8 +58,19 @@ def _wrong_robots(judgements: Sequence[CaseJudgement]) -> ElementTable:
     table = ElementTable("robot_answer", is_of_cases=True)
     for judgement in judgements:
         is_wrong = float(judgement.verdict >= Verdict.WRONG)
-        table.add(judgement.case.name, is_wrong, _robot_features(judgement.case.inputs))
+        inputs = judgement.case.inputs
+        features = _robot_features(inputs) | {"opposite_quaternion": _has_opposite(inputs)}
+        table.add(judgement.case.name, is_wrong, features)
     return table
+
+
+def _has_opposite(inputs: Inputs) -> bool:
+    """Return whether a target's quaternion is opposite to that of the tool or the frame before."""
+    if "start" not in inputs:
+        return False
+    targets = inputs.get("target_rotations", inputs.get("target_rotation")).reshape(-1, 4)
+    path = np.concatenate([tool_pose(inputs, inputs["start"]).rotations[None], targets])
+    return bool(((path[1:] * path[:-1]).sum(axis=1) < 0.0).any())
 
 
 def _robot_features(robot: Inputs) -> dict[str, bool]:
