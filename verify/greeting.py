@@ -34,7 +34,10 @@ Seconds = Annotated[float, Meta(gt=0, le=1, description="scenes are judged after
 MOST_ITERATIONS = 1000
 
 Precision = Literal["single", "double"]
-Method = Literal["explicit", "symplectic", "linearised", "local_global", "newton", "converged"]
+Method = Literal[
+    "explicit", "symplectic", "linearised", "local_global", "newton", "converged",
+    "position_based",
+]  # fmt: skip
 
 
 class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -42,13 +45,15 @@ class Step(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
     Attributes:
         method: explicit or symplectic Euler, one linearised implicit step, local/global or Newton
-            iterations, or implicit Euler converged.
+            iterations, implicit Euler converged, or position_based: free flight, then projections
+            of springs (Verlet with constraints, PBD, XPBD), which laws alone judge.
         start: where iterations begin: x_n, y = x_n + h v_n, or s_n = y + h² M⁻¹ f_ext.
         iterations: how many of them a step has.
         substeps: how many equal steps make up h.
         damper: none; explicit; length_rate: (c/h) (l - l_n) along the spring; end_velocity:
             the force of the velocities at the end; global_factor: every velocity is scaled.
-        damping_factor: the factor of global_factor for velocities after each substep.
+        damping_factor: the factor of global_factor for velocities in each substep; it may act
+            before the forces, between forces and positions, or after both.
         pins: eliminated from the unknowns, overwritten after the solve, held by a penalty, or
             heavy.
         velocity: displacement: (x' - x_n) / h; separate: integrated beside the positions.

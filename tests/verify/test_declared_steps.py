@@ -1,4 +1,4 @@
-"""A declared method that is kept is right; a mistake is named by the answers that fail."""
+"""A declared method that is kept is right, and so are its factors and pins."""
 
 import numpy as np
 import pytest
@@ -7,9 +7,8 @@ from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.mass_spring.cases import task_cases
-from plumbob.verify.mass_spring.honest import honest
+from plumbob.verify.mass_spring.measured import measured
 from plumbob.verify.mass_spring.model import Integrator, StepModel, simulate
-from plumbob.verify.mass_spring.pin_strength import measured_pins
 from plumbob.verify.mass_spring.problem import problem_of
 from plumbob.verify.verify import DISCIPLINES, judge_cases
 from tests.honest_solvers import Stepper
@@ -181,18 +180,63 @@ EXPLICIT = StepModel(Integrator("symplectic"), 1, "explicit", velocity="separate
 def test_the_strength_of_pins_is_that_of_the_answers(pins, model):
     if model.integrator.explicit and not pins.startswith(("heavy", "weightless")):
         pytest.skip("springs to pins do not act in a step that is explicit")
-    usual = honest(Step())["pins"]
     answers = [(p, simulate(p, model._replace(pins=pins))) for p in ANSWERS]
-    measured = [option.fields["pins"] for option in measured_pins(usual, answers)]
-    assert pins in measured
-    assert sum(choice.split()[0] == pins.split()[0] for choice in measured) == 1
+    kind, strength = pins.split()
+    numbers = measured(answers, None)
+    assert numbers[kind] == [strength]
+    assert numbers["substeps"] == ([4] if model.integrator.explicit else [])
 
 
 @pytest.mark.parametrize("pins", ["eliminated", "overwritten", "heavy 2"])
 def test_pins_that_hold_or_are_light_have_no_strength(pins):
-    usual = honest(Step())["pins"]
     answers = [(p, simulate(p, IMPLICIT._replace(pins=pins))) for p in ANSWERS]
-    assert measured_pins(usual, answers) == list(usual)
+    assert measured(answers, None).keys() == {"substeps", "factor"}
+
+
+class Slowed:
+    """Explicit and symplectic Euler, by the order of three updates, with velocities scaled once."""
+
+    def __init__(self, order, factor=0.97, substeps=1):
+        self.order, self.factor, self.substeps = order, factor, substeps
+
+    def __call__(self, positions, velocities, h, pinned, masses, dampings, **system):
+        """Return the new state."""
+        x, v = positions.copy(), velocities.copy()
+        free = np.setdiff1d(np.arange(len(x)), pinned)
+        for update in self.substeps * self.order.split():
+            if update == "scale":
+                v[free] *= self.factor
+            elif update == "move":
+                x[free] += h / self.substeps * v[free]
+            else:
+                f = forces(x, v, masses=masses, dampings=0.0 * dampings, **system)
+                v[free] += h / self.substeps * (f / masses[:, None])[free]
+        return {"positions": x, "velocities": v}
+
+
+ORDERS = [
+    "scale force move", "force scale move", "force move scale", "scale move force",
+    "move scale force", "move force scale",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("substeps", [1, 3])
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_declared_factor_may_act_before_forces_and_after(order, substeps):
+    step = Step("symplectic", damper="global_factor", damping_factor=0.97, substeps=substeps)
+    assert judged(Slowed(order, 0.97, substeps), step).verdict is Verdict.RIGHT
+    if substeps == 1:
+        assert judged(Slowed(order, 0.96), step).verdict is Verdict.WRONG
+
+
+@pytest.mark.sample("force move scale")
+@pytest.mark.parametrize("order", ORDERS)
+def test_a_factor_that_is_not_declared_is_a_mistake(order):
+    report = judged(Slowed(order), Step("symplectic"))
+    is_last = order.endswith("move scale") or order == "move force scale"
+    assert report.verdict is (Verdict.RIGHT_EXCEPT if is_last else Verdict.WRONG)
+    if is_last:
+        assert "velocity loss" in laws_with(report, Verdict.RIGHT_EXCEPT)
 
 
 # Methods that do not converge, or hold pins by less than all, with all that a greeting may say.

@@ -27,9 +27,14 @@ STEPS = [
     "linearised heavy", "linearised single", "local_global undamped",
     "local_global fifty undamped",
 ]  # fmt: skip
+PROJECTIONS = [
+    "pbd", "pbd reversed", "pbd undeclared", "verlet", "verlet overwritten", "verlet slowed",
+    "soft", "soft undeclared", "xpbd", "xpbd substeps",
+]  # fmt: skip
 HONEST = [
     *(f"right_arms.py FORM={form}" for form in ARMS),
     *(f"right_steps.py FORM={form}" for form in STEPS),
+    *(f"right_projections.py FORM={form}" for form in PROJECTIONS),
     *(f"right_trees.js FORM={form}" for form in ("climb", "matrix", "rodrigues", "single")),
     *(f"{program['file']} MISTAKE=0" for program in FIVE.values()),
 ]

@@ -62,6 +62,7 @@ class SpringScene:
     # attributes of `System` without which it makes no sense: "pinned" and so on
     needs: tuple[str, ...] = ()
     tasks: tuple[str, ...] = ()  # those that it suits; () for all
+    methods: tuple[str, ...] = ()  # the declared methods that it is for; () for all
     follows: str = ""  # the name of the scene that is asked just before it
     probe: bool = True  # whether faults are sought in it
     facts: Mapping[str, Any] = field(default_factory=dict)  # passed on to the laws
@@ -107,7 +108,9 @@ def _suitable(task: str, greeting: Greeting, drawn: Sequence[SpringScene]) -> li
     suitable = [
         _case(task, scene, system)
         for scene in drawn
-        if task in (scene.tasks or TASKS) and all(_has(system, need) for need in scene.needs)
+        if task in (scene.tasks or TASKS)
+        and greeting.step.method in (scene.methods or (greeting.step.method,))
+        and all(_has(system, need) for need in scene.needs)
     ]
     names = {"", *(case.name for case in suitable)}
     return [case for case in suitable if case.follows in names]
@@ -213,7 +216,7 @@ def _fields(entry: Mapping[str, Any]) -> dict[str, Any]:
     """Return an entry of the table as fields of a scene."""
     fields: dict[str, Any] = {
         name: np.array(content)
-        if isinstance(content, list) and name not in ("needs", "tasks")
+        if isinstance(content, list) and name not in ("needs", "tasks", "methods")
         else content
         for name, content in entry.items()
     }

@@ -1,8 +1,7 @@
 """The choices that an honest solver may make, and which of them a greeting leaves open."""
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
-from functools import cache
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import product
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -10,7 +9,7 @@ from typing import Any, NamedTuple
 from plumbob.text.sentence import Sentence
 
 from ..greeting import Step
-from .model import EXPLICIT, Integrator, StepModel
+from .model import EXPLICIT, Integrator, Scaling, StepModel
 
 # Aspects of a step in the order of the computation.
 ASPECTS = ("damper", "integrator", "substeps", "pins", "velocity", "scaling")
@@ -18,10 +17,12 @@ ASPECTS = ("damper", "integrator", "substeps", "pins", "velocity", "scaling")
 SYMPLECTIC = {"symplectic": "velocities_first", "positions_first": "positions_first"}
 # Methods with a number of iterations.
 ITERATIVE = ("newton", "local_global")
-# Dampers that explicit methods can have, and of these the ones that only symplectic Euler has.
-EXPLICIT_DAMPERS = ("none", "explicit", "diagonal", "blocks", "matrix")
-SYMPLECTIC_DAMPERS = ("diagonal", "blocks", "matrix")
+# Kinds of pins by the word of a greeting; another word has the kind of its name.
+PINS = {"penalty": ("penalty", "springs"), "heavy": ("heavy", "weightless", "falling")}
+EXPLICIT_DAMPERS = ("none", "explicit")
 IMPLICIT_DAMPERS = ("length_rate", "end_velocity", "explicit", "none")
+# The classes of choices that have fields.
+CLASSES: Mapping[str, Callable[..., Any]] = {"integrator": Integrator, "scaling": Scaling}
 _TABLE = tomllib.loads(Path(__file__).with_name("honest.toml").read_text(encoding="utf-8"))
 
 
@@ -30,75 +31,69 @@ class Option(NamedTuple):
 
     aspect: str  # what it is a choice of; a solver makes one choice for each aspect
     sentence: Sentence  # what it does
-    fields: Mapping[str, Any]  # the fields that it replaces in a model
+    choice: Any  # the field of a model that has the aspect's name
 
 
 def model_of(options: Sequence[Option]) -> StepModel:
     """Return the model of a solver with these options, without dampers unless one has them."""
-    fields = {name: value for option in options for name, value in option.fields.items()}
+    fields = {option.aspect: option.choice for option in options}
     return StepModel(damper="none")._replace(**fields)
 
 
-def _options_of(aspect: str, entry: Mapping[str, Any]) -> Iterator[Option]:
-    """Yield an option for each combination of the numbers in an entry's `each`."""
-    ranges = entry.get("each", {})
-    for numbers in product(*ranges.values()):
-        values = dict(zip(ranges, numbers, strict=True))
-        if "integrator" in entry:
-            choice: Any = Integrator(**entry["integrator"], **values)
-        elif isinstance(entry.get("value"), str):
-            choice = entry["value"].format(**values)
-        else:
-            choice = values.get(aspect, entry.get("value"))
-        yield Option(aspect, Sentence(entry["sentence"], values), {aspect: choice})
+def honest(step: Step, measured: Mapping[str, Sequence[Any]]) -> dict[str, tuple[Option, ...]]:
+    """Return, for each aspect, the honest choices, the usual choice first.
 
-
-@cache
-def honest(step: Step) -> dict[str, tuple[Option, ...]]:
-    """Return, for each aspect, the honest choices, the usual choice first."""
-    numbers = {
-        "iterations": step.iterations, "substeps": step.substeps, "scaling": step.damping_factor,
+    A number of a choice is the declared number, else one of those that answers show (`measured`, by
+    name), else one of a table.
+    """
+    declared = {
+        "iterations": step.iterations, "substeps": step.substeps, "factor": step.damping_factor,
     }  # fmt: skip
+    # Declared pins that show no strength hold as strongly as this, by penalty or mass.
+    numbers: dict[str, Sequence[Any]] = {kind: ["1e10"] for kind in PINS.get(step.pins or "", ())}
+    numbers |= measured
+    numbers |= {name: [n] for name, n in declared.items() if n not in (None, 1)}
     return {
-        aspect: tuple(
-            option
-            for entry in entries
-            for option in _options_of(aspect, entry | {"each": {
-                name: _including(values, numbers.get(name))
-                for name, values in entry.get("each", {}).items()
-            }})
-        )
+        aspect: tuple(option for entry in entries for option in _options_of(aspect, entry, numbers))
         for aspect, entries in _TABLE.items()
-    }  # fmt: skip
+    }
 
 
-def _including(values: list[Any], declared: float | None) -> list[Any]:
-    """Return values with the declared one; 1 has an entry of its own."""
-    return values if declared in (None, 1) else sorted({*values, declared})
+def _options_of(
+    aspect: str, entry: Mapping[str, Any], numbers: Mapping[str, Sequence[Any]]
+) -> Iterator[Option]:
+    """Yield an option for each combination of the numbers in an entry's `each`."""
+    own = {entry.get("measured", name): name for name in entry.get("each", {})}
+    ranges = [numbers.get(key, entry["each"][name]) for key, name in own.items()]
+    for chosen in product(*ranges):
+        values = dict(zip(own.values(), chosen, strict=True))
+        fixed = entry.get("value")
+        if isinstance(fixed, dict):
+            choice: Any = CLASSES[aspect](**fixed, **values)
+        else:
+            choice = fixed.format(**values) if isinstance(fixed, str) else values.get(aspect, fixed)
+        yield Option(aspect, Sentence(entry["sentence"], values), choice)
 
 
 def declared(option: Option, step: Step) -> bool:
     """Return whether a choice is declared or left open by the greeting."""
-    choice = option.fields[option.aspect]
+    choice = option.choice
     match option.aspect:
         case "integrator":
             return _declared_integrator(choice, step)
         case "substeps":
             return step.substeps in (None, choice)
         case "damper":
-            return step.damper in (None, choice) or (step.damper, choice) == (
-                "global_factor",
-                "none",
-            )
+            return choice == ("none" if step.damper == "global_factor" else step.damper or choice)
         case "pins":
-            kinds = {"penalty": ("penalty", "springs"), "heavy": ("heavy", "weightless")}
-            return step.pins is None or choice.split()[0] in kinds.get(step.pins, (step.pins,))
+            return step.pins is None or choice.split()[0] in PINS.get(step.pins, (step.pins,))
         case "velocity":  # explicit methods have no other velocity than their own
             own = step.method in ("explicit", "symplectic") and choice == "separate"
             return own or step.velocity in (None, choice)
-        case "scaling" if step.damper in (None, "global_factor"):
-            return step.damper is None or step.damping_factor in (None, choice)
-    return bool(choice == 1.0)
+    if step.damper == "global_factor":
+        return step.damping_factor in (None, choice.factor)
+    # A factor that is not declared is recognised at the end alone, where it is a reservation.
+    return choice == Scaling() or (step.damper is None and choice.place == "end")
 
 
 def _declared_integrator(integrator: Integrator, step: Step) -> bool:
@@ -118,34 +113,26 @@ def _declared_integrator(integrator: Integrator, step: Step) -> bool:
     )
 
 
-def declared_choices(step: Step) -> dict[str, list[Option]]:
+def declared_choices(
+    step: Step, measured: Mapping[str, Sequence[Any]] | None = None
+) -> dict[str, list[Option]]:
     """Return, for each aspect, the honest choices that a greeting declares or leaves open."""
-    choices = honest(step)
+    choices = honest(step, measured or {})
     return {a: [option for option in choices[a] if declared(option, step)] for a in ASPECTS}
 
 
 def compatible(options: Mapping[str, Option]) -> bool:
     """Return whether choices make sense together, as far as they are made."""
-    fields = {k: value for option in options.values() for k, value in option.fields.items()}
-    damper, velocity = fields.get("damper"), fields.get("velocity")
-    if "integrator" not in fields:
+    if "integrator" not in options:
         return True
-    method = fields["integrator"].method
-    if damper in SYMPLECTIC_DAMPERS and method not in SYMPLECTIC:
-        return False
-    if damper and damper not in (EXPLICIT_DAMPERS if method in EXPLICIT else IMPLICIT_DAMPERS):
-        return False
-    own = ("explicit", "positions_first", "taylor", "runge_kutta")
-    if velocity == "displacement" and method in own:
-        return False
-    return _are_few(fields, method)
-
-
-def _are_few(fields: Mapping[str, Any], method: str) -> bool:
-    """Return whether so many substeps are worth their time."""
-    substeps = fields.get("substeps", 1)
-    if method not in ("explicit", *SYMPLECTIC):
-        return bool(substeps <= (30 if method in EXPLICIT else 20))
-    usual = {"velocity": "separate", "scaling": 1.0}
-    is_plain = all(fields.get(name, choice) == choice for name, choice in usual.items())
-    return bool(substeps <= 30 or is_plain)
+    model, method = model_of([*options.values()]), options["integrator"].choice.method
+    is_explicit = method in EXPLICIT
+    dampers = EXPLICIT_DAMPERS if is_explicit else IMPLICIT_DAMPERS
+    places = ("start", "middle", "end") if method in ("explicit", *SYMPLECTIC) else ("start", "end")
+    return (
+        (model.damper in dampers or (model.damper == "matrix" and method in SYMPLECTIC))
+        and model.scaling.place in places
+        and not (is_explicit and model.pin_kind in PINS["penalty"])
+        # the velocity that moves positions in symplectic Euler is its new one
+        and not (is_explicit and method != "symplectic" and model.velocity == "displacement")
+    )

@@ -18,24 +18,16 @@ from plumbob.text.sentence import Sentence, sentence, with_code
 from ..explain import ending_test
 from ..fault_programs import coded_faults
 from ..judgement import LEAST_SHARE, Explanation
-from .honest import Option, model_of
-from .laws import (
-    IMPRECISE,
-    ROUNDED,
-    SOLVED,
-    is_indefinite,
-    relative_gap,
-    rounding,
-    stiffness_of,
-)  # fmt: skip
+from .laws import IMPRECISE, ROUNDED, SOLVED, is_indefinite, relative_gap, rounding, stiffness_of
 from .model import (
+    HESSIANS,
     ITERATES,
     Integrator,
     StepEquation,
     StepModel,
     first_equation,
     predicted,
-)  # fmt: skip
+)
 from .model_search import LARGEST, Probe
 from .problem import SpringProblem
 
@@ -69,21 +61,17 @@ SCALES: Mapping[str, Callable[[FloatArray, FloatArray], FloatArray]] = {
 # What iterations may compare with a bound to end, one number for each iterate of a track, and its
 # words.
 TESTS: Sequence[tuple[Callable[[Any], Any], None, Sentence]] = (
-    (lambda t: -np.arange(len(t["residuals"])), None,
+    (lambda t: -np.arange(len(t.residuals)), None,
      sentence("after iteration {iterations}, whatever is left")),
-    (lambda t: t["moves"][:-1], None,
+    (lambda t: t.moves, None,
      sentence("when no particle moves by more than about {bound:.2g} m")),
-    (lambda t: t["moves"][1:], None,
-     sentence("when the next move is shorter than about {bound:.2g} m, and leave it out")),
-    (lambda t: t["residuals"] / max(t["residuals"][0], 1e-300), None,
+    (lambda t: t.residuals / max(t.residuals[0], 1e-300), None,
      sentence("when the residual is below about {bound:.2g} of the first one")),
-    (lambda t: t["residuals"], None,
+    (lambda t: t.residuals, None,
      sentence("when the residual is below about {bound:.2g} kg m")),
-    (lambda t: t["residuals"] / t["h"], None,
+    (lambda t: t.residuals / t.h, None,
      sentence("when the residual of the equation for the change of velocity is below about "
               "{bound:.2g}, whatever it was first")),
-    (lambda t: np.append(np.inf, -np.diff(t["energies"]) / abs(t["energies"][1:])), None,
-     sentence("when the energy g falls by less than about {bound:.2g} of its value")),
 )  # fmt: skip
 
 
@@ -105,55 +93,47 @@ class StepAnswer(NamedTuple):
 class Track(NamedTuple):
     """The iterates of a method up to an answer."""
 
-    moves: FloatArray  # by how much a particle moves at most before each, and after the last [m]
+    moves: FloatArray  # by how much a particle moves at most before each [m]
     residuals: FloatArray
-    energies: FloatArray
     is_early: bool  # whether the answer is wrong
-    is_exhausted: bool  # whether there is no next iterate
     h: float  # [s]
-
-    @property
-    def is_moved(self) -> bool:
-        """Whether the answer is not the start: many other mistakes leave that."""
-        return len(self.moves) > 2
 
 
 def explanation(
-    options: Sequence[Option], probes: Sequence[Probe], start: str | None, epsilon: float
+    model: StepModel, probes: Sequence[Probe], start: str | None, epsilon: float
 ) -> Explanation | None:
     """Return that iterations end too early where that leaves the wrong answers, else None.
 
     It is None where no error is larger than `IMPRECISE` of the displacement. Iterations that end by
     no known test give way to those with one.
     """
-    trials = trials_of(options, probes, epsilon)
+    trials = trials_of(model, probes, epsilon)
     wrong = [trial for trial in trials if trial.error > SOLVED and not trial.is_unlike]
     wrong.sort(key=lambda trial: (is_indefinite(trial.problem), trial.problem.count))
     if not any(trial.error > IMPRECISE for trial in wrong):
         return None
-    model, vague = model_of(options), None
+    vague = None
     for integrator in _integrators(model, STARTS[start]):
         follow = partial(_track, model._replace(integrator=integrator))
-        first = list(takewhile(bool, map(follow, wrong[:TRIALS])))
-        if len(first) == len(wrong[:TRIALS]) and any(track.is_moved for track in first if track):
+        first = [track for track in takewhile(bool, map(follow, wrong[:TRIALS])) if track]
+        # many other mistakes leave the start
+        is_moved = any(len(track.moves) > 2 for track in first)
+        if is_moved and len(first) == len(wrong[:TRIALS]):
             tracks = [follow(trial) for trial in trials]
-            found = _explanation(integrator, tracks, trials)
-            if found and _ending(tracks):
-                return found
-            vague = vague or found
+            words = _explanation(integrator, tracks, trials)
+            if words and _ending(tracks):
+                return words
+            vague = vague or words
     return vague
 
 
-def stiffness_hint(
-    options: Sequence[Option], probes: Sequence[Probe], epsilon: float
-) -> Sentence | None:
+def stiffness_hint(model: StepModel, probes: Sequence[Probe], epsilon: float) -> Sentence | None:
     """Return that answers are right except where the system is stiff, None if they are not."""
-    trials = [t for t in trials_of(options, probes, epsilon) if not is_indefinite(t.problem)]
+    trials = [t for t in trials_of(model, probes, epsilon) if not is_indefinite(t.problem)]
     right = [s for t in trials if t.error <= IMPRECISE and (s := stiffness_of(t.problem)) > 0.0]
     wrong = [stiffness_of(t.problem) for t in trials if t.error > IMPRECISE]
     if not right or not wrong or max(right) >= min(wrong):
         return None
-    model = model_of(options)
     is_linear = (model.integrator.method, model.integrator.iterations) == ("newton", 1)
     place = sentence(
         "the linear solver: its number of iterations, its end and, of conjugate gradients, α and β"
@@ -170,18 +150,15 @@ def stiffness_hint(
     )  # fmt: skip
 
 
-def trials_of(
-    options: Sequence[Option], probes: Sequence[Probe], epsilon: float
-) -> list[StepAnswer]:
+def trials_of(model: StepModel, probes: Sequence[Probe], epsilon: float) -> list[StepAnswer]:
     """Return the answers as single steps."""
-    return [_trial(options, epsilon, probe) for probe in probes if "positions" in probe.answers]
+    return [_trial(model, epsilon, probe) for probe in probes if "positions" in probe.answers]
 
 
-def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswer:
+def _trial(model: StepModel, epsilon: float, probe: Probe) -> StepAnswer:
     """Return the answer to a single step, or to the first of several."""
     problem = probe.problem.changed(steps=None)
     positions = probe.answers["positions"].reshape(-1, problem.count, 3)[0]
-    model = model_of(options)
     expected = predicted(problem, model, positions)
     allowed = rounding(problem, model, epsilon)
     if not expected:
@@ -194,7 +171,7 @@ def _trial(options: Sequence[Option], epsilon: float, probe: Probe) -> StepAnswe
     is_unlike = False
     if "velocities" in probe.answers and (model.velocity, model.substeps) == ("displacement", 1):
         velocities = {"velocities": probe.answers["velocities"].reshape(-1, problem.count, 3)[0]}
-        own = {"velocities": (positions - problem.positions) / problem.h * model.scaling}
+        own = {"velocities": (positions - problem.positions) / problem.h * model.scaling.factor}
         is_unlike = relative_gap(problem, own, velocities, allowed) > IMPRECISE
     return StepAnswer(problem, positions, error, 4.0 * allowed.positions + bound, is_unlike)
 
@@ -236,10 +213,7 @@ def _words(integrator: Integrator, tracks: Sequence[Track | None]) -> tuple[str,
 def _ending(tracks: Sequence[Track | None]) -> Sentence | None:
     """Return the test by which iterations end early, None if it is unknown."""
     followed = [track for track in tracks if track is not None]
-    if all(track.is_exhausted for track in followed if track.is_early):
-        return sentence("when their line search finds no lower energy")
-    is_early = [track.is_early for track in followed]
-    return ending_test(TESTS, [track._asdict() for track in followed], is_early)
+    return ending_test(TESTS, followed, [track.is_early for track in followed])
 
 
 def _integrators(model: StepModel, starts: Sequence[str]) -> Iterator[Integrator]:
@@ -252,9 +226,8 @@ def _integrators(model: StepModel, starts: Sequence[str]) -> Iterator[Integrator
     if method == "converged" or (method == "local_global" and model.integrator.iterations > 1):
         yield from (Integrator("local_global", start) for start in starts)
     if method in ("newton", "converged"):
-        for start, is_safeguarded in product(starts, (True, False)):
-            for hessian in ("exact", "gauss", "projected"):
-                yield Integrator("newton", start, 1, hessian, is_safeguarded)
+        for start, hessian in product(starts, HESSIANS):
+            yield Integrator("newton", start, 1, hessian)
 
 
 def _track(model: StepModel, trial: StepAnswer) -> Track | None:
@@ -263,29 +236,19 @@ def _track(model: StepModel, trial: StepAnswer) -> Track | None:
     is_slow = model.integrator.method != "newton"
     limit = MAX_ITERATIONS + 10 * trial.positions.size * is_slow
     start = np.where(equation.free, equation.starts[model.integrator.start], equation.start.x)
-    xs = list[FloatArray]()
+    xs, moves = list[FloatArray](), [np.inf]
     with np.errstate(all="ignore"), suppress(np.linalg.LinAlgError):
         iterates, residual = _iteration(equation, start)
         for x in islice(iterates, 1 + limit):
-            move = np.abs(x - xs[-1]).max() if xs else np.inf
+            if xs:
+                moves.append(float(np.linalg.norm(x - xs[-1], axis=-1).max()))
             xs.append(x)
-            gap = np.abs(x - trial.positions).max()
+            gap = float(np.abs(x - trial.positions).max())
             if gap <= trial.bound:
-                break
-            if move < STATIONARY * gap or not gap < LARGEST:
+                residuals = np.array([np.linalg.norm(residual(x)) for x in xs])
+                return Track(np.array(moves), residuals, trial.error > SOLVED, equation.start.h)
+            if moves[-1] < STATIONARY * gap or not gap < LARGEST:
                 return None
-        else:
-            return None
-        following = next(iterates, None)
-        moves = np.diff([*xs, xs[-1] if following is None else following], axis=0)
-        return Track(
-            np.append(np.inf, np.linalg.norm(moves, axis=-1).max(axis=-1)),
-            np.array([np.linalg.norm(residual(x)) for x in xs]),
-            np.array([equation.value(x) for x in xs]),
-            trial.error > SOLVED,
-            following is None,
-            equation.start.h,
-        )
     return None
 
 

@@ -16,7 +16,7 @@ from ..greeting import Step
 from ..judgement import Finding, Verdict
 from ..laws import finding
 from .honest import ITERATIVE
-from .model import EXPLICIT, StepModel
+from .model import EXPLICIT, Scaling, StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 
 # A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
@@ -132,7 +132,9 @@ class StepContext:
         step = self.step
         is_counted = step.method in ITERATIVE and step.iterations is not None
         is_divided = step.method is not None and step.substeps not in (None, 1)
-        return is_counted or is_divided or step.method in ("linearised", *EXPLICIT)
+        return (
+            is_counted or is_divided or step.method in ("linearised", "position_based", *EXPLICIT)
+        )
 
     @property
     def displacement(self) -> float:
@@ -168,7 +170,7 @@ def pins(context: StepContext) -> Finding | None:
         tolerance += min(motion, largest)
     if context.step.pins in ("penalty", "heavy"):
         strict += motion
-    is_exact = context.model.pins in ("eliminated", "overwritten") and context.step.pins
+    is_exact = context.model.holds_pins and context.step.pins not in (None, "heavy")
     verdict = Verdict.RIGHT_EXCEPT if worst <= tolerance and not is_exact else Verdict.WRONG
     index = int(p.pinned[offsets.max(axis=0).argmax()])
     return finding("pins", worst, strict, verdict=verdict, index=index)
@@ -203,7 +205,7 @@ def _excused(context: StepContext) -> Verdict:
         return Verdict.UNDECIDED
     if model.integrator.method == "newton" and is_indefinite(context.problem):
         return Verdict.UNDECIDED
-    if model.integrator.method == "converged" and (model.substeps, model.scaling) == (1, 1.0):
+    if model.integrator.method == "converged" and (model.substeps, model.scaling) == (1, Scaling()):
         judgement = context.judgement
     if judgement is None or not judgement.certificate.covered:
         return Verdict.WRONG
@@ -239,10 +241,10 @@ def velocities(context: StepContext) -> Finding | None:
     if "velocities" not in context.answers or not context.recognised or not context.expected:
         return None
     expected, model = context.expected["velocities"], context.model
-    p, x = context.problem, context.answers.get("positions")
+    p, x, at_end = context.problem, context.answers.get("positions"), model.scaling.place == "end"
     by_displacement = model.velocity == "displacement" and not model.integrator.explicit
     if by_displacement and model.substeps == 1 and x is not None and not p.steps:
-        expected = (x - p.positions) / p.h * model.scaling
+        expected = (x - p.positions) / p.h * (model.scaling.factor if at_end else 1.0)
     gap = coordinate_gap(p, "velocities", expected, context.answers["velocities"])
     size = float(np.abs(expected).max(initial=0.0))
     error = gap / (size + context.allowed.velocities / SOLVED)
@@ -254,7 +256,7 @@ def velocities(context: StepContext) -> Finding | None:
 
 def velocity_loss(context: StepContext) -> Finding | None:
     """Return the share of its speed that an undeclared factor takes from a particle in 1 s."""
-    factor = context.model.scaling
+    factor = context.model.scaling.factor
     if factor == 1.0 or context.step.damper == "global_factor" or not context.recognised:
         return None
     loss = 1.0 - factor ** (context.model.substeps / context.problem.h)
@@ -264,7 +266,7 @@ def velocity_loss(context: StepContext) -> Finding | None:
 def pin_velocities(context: StepContext) -> Finding | None:
     """Return how fast pins are that do not move."""
     p, v = context.problem, context.answers.get("velocities")
-    if v is None or len(p.pinned) == 0 or context.model.pins not in ("eliminated", "overwritten"):
+    if v is None or len(p.pinned) == 0 or not context.model.holds_pins:
         return None
     speeds = np.linalg.norm(v, axis=-1)[..., p.pinned].reshape(-1, len(p.pinned)).max(axis=0)
     if not np.isfinite(speeds).all():
@@ -277,13 +279,10 @@ def momentum(context: StepContext) -> Finding | None:
     """Return how far the centre of mass is from where gravity takes it, without pins."""
     p, x, model = context.problem, context.answers.get("positions"), context.model
     method = model.integrator.method
-    if x is None or len(p.pinned) or p.steps or model.scaling != 1.0:
+    if x is None or len(p.pinned) or p.steps or model.scaling.factor != 1.0:
         return None
-    if model.damper in ("diagonal", "blocks"):
-        return None  # each end has its own share of a damper there
-    share = p.masses / p.masses.sum()
     fall = p.h**2 * (p.constant.sum(0) / p.masses.sum())
-    drift = share @ (x - p.positions - p.h * p.velocities)
+    drift = p.shares @ (x - p.positions - p.h * p.velocities)
     size = float(fall @ fall)
     part = float(np.clip(drift @ fall / size, 0.0, 1.0)) if size else 0.0
     gap = float(np.linalg.norm(drift - part * fall))
@@ -302,7 +301,7 @@ def keeps_declaration(context: StepContext) -> bool:
 def consistency(context: StepContext) -> Finding | None:
     """Return how far the mean acceleration of a small step is from f / m."""
     p, v = context.problem, context.answers.get("velocities")
-    if v is None or context.model.damper == "none" or context.model.scaling != 1.0:
+    if v is None or context.model.damper == "none" or context.model.scaling.factor != 1.0:
         return None  # without velocities explicit and implicit steps part at the first order
     expected = accelerations(p, p.positions, p.velocities)
     free = np.setdiff1d(np.arange(p.count), p.pinned)

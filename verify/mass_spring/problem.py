@@ -49,6 +49,11 @@ class SpringProblem:
         return self.masses[:, None]
 
     @cached_property
+    def shares(self) -> FloatArray:
+        """The share of each particle in the mass."""
+        return np.asarray(self.masses / self.masses.sum())
+
+    @cached_property
     def incidence(self) -> FloatArray:
         """Rows with 1 at a spring's first end and -1 at its second, shape (spring, particle)."""
         identity = np.eye(self.count)
@@ -130,6 +135,8 @@ def stretches(p: SpringProblem, length: FloatArray) -> FloatArray:
 
 def spring_forces(p: SpringProblem, x: FloatArray) -> FloatArray:
     """Return the springs' forces on the particles [N], shape (particle, 3)."""
+    if not p.stiff:
+        return np.zeros_like(x)
     length, u = frames(p, x)
     return -p.incidence.T @ ((p.stiffnesses * stretches(p, length))[:, None] * u)
 
@@ -143,16 +150,17 @@ def damper_forces(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     return -p.incidence.T @ ((p.dampings * rate)[:, None] * u)
 
 
-def all_forces(p: SpringProblem) -> FloatArray:
+def all_forces(
+    p: SpringProblem, x: FloatArray | None = None, v: FloatArray | None = None
+) -> FloatArray:
     """Return springs, dampers, gravity and external forces on the particles, (particle, 3) [N]."""
-    x, v = p.positions, p.velocities
+    x, v = p.positions if x is None else x, p.velocities if v is None else v
     return p.constant + spring_forces(p, x) + damper_forces(p, x, v)
 
 
 def accelerations(p: SpringProblem, x: FloatArray, v: FloatArray) -> FloatArray:
     """Return M^-1 f, pins included, shape (particle, 3) [m/s^2]."""
-    total = p.constant + damper_forces(p, x, v)
-    return (total + spring_forces(p, x) if p.stiff else total) / p.inertia
+    return all_forces(p, x, v) / p.inertia
 
 
 def elastic_energy(p: SpringProblem) -> float:

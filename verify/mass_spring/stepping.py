@@ -2,9 +2,9 @@
 
 import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
-from functools import partial
-from typing import NamedTuple
+from dataclasses import dataclass, field, replace
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -26,11 +26,11 @@ from ..judgement import (
     first_broken,
 )
 from ..laws import digits, hints_of, judge_case
-from . import laws
+from . import laws, position_based
 from .cases import task_cases, trace_of
-from .honest import ITERATIVE, SYMPLECTIC, Option, model_of
+from .honest import ITERATIVE, PINS, SYMPLECTIC, Option, model_of
 from .laws import SOLVED, StepContext, rounding
-from .model import StepModel, predicted
+from .model import Scaling, StepModel, predicted
 from .model_search import ModelSearch, Probe, honest_options, probes_of
 from .problem import SpringProblem, problem_of, state_of, system_of
 
@@ -51,46 +51,97 @@ class Stepping(NamedTuple):
 
     def judge(self, exchanges: Sequence[Exchange], greeting: Greeting, method: str) -> TaskReport:
         """Hold answers against the step that is declared, or that an honest program makes."""
-        problems = problems_of(exchanges, greeting)
-        search = ModelSearch(telling_probes(exchanges, problems), greeting)
-        match = search.run(probes_of(exchanges, problems, every=True))
-        judgements = _judge_all(exchanges, problems, greeting, match)
+        recognition = recognise(exchanges, greeting)
+        judgements = [_judge_case(exchange, exchanges, recognition) for exchange in exchanges]
         is_wrong = any(judgement.verdict >= Verdict.WRONG for judgement in judgements)
-        options = honest_options(match, greeting)
-        behaviour = step_behaviour(options, greeting.step, is_wrong) if match else None
         first, hints = first_broken_step(judgements), hints_of(judgements)
         if repeats(judgements, 1.0):
             first = sentence(
                 "Positions are those of the request in all its answers: nothing moves. Answer the "
                 "state at the end of the step."
             )
-        diagnosis = Diagnosis((), behaviour, first, hints, is_double=search.is_double())
+        behaviour = recognition.behaviour(is_wrong)
+        diagnosis = Diagnosis((), behaviour, first, hints, is_double=recognition.is_double)
         return TaskReport(self.TASK, "", judgements, diagnosis)
 
 
-def telling_probes(
-    exchanges: Sequence[Exchange], problems: Mapping[str, SpringProblem]
-) -> list[Probe]:
-    """Return the probes, none if the answers are constant, which are of no step."""
+class Recognition(NamedTuple):
+    """The honest step that answers are of, or that the greeting declares."""
+
+    exchanges: tuple[Exchange, ...]
+    greeting: Greeting
+    problems: Mapping[str, SpringProblem]
+    telling: list[Probe]  # by which it was sought, none if the answers are of no step
+    probes: list[Probe]  # all answers
+    match: tuple[Option, ...]  # () if none explains the answers
+    options: tuple[Option, ...]  # the match, completed by declared and usual choices
+    model: StepModel
+    is_position_based: bool
+    is_double: bool  # whether the answers have more digits than single precision leaves
+
+    @property
+    def is_known(self) -> bool:
+        """Whether the step is declared or was recognised."""
+        declared = self.greeting.step.method is not None
+        return declared or self.is_position_based or bool(self.match)
+
+    @property
+    def description(self) -> Sentence:
+        """The step in words."""
+        if self.is_position_based:
+            return position_based.description(self.model)
+        return describe_model(self.options)
+
+    def behaviour(self, is_wrong: bool) -> Sentence | None:
+        """Return the step that answers are of, None if it is the one that is declared."""
+        if not self.is_position_based:
+            words = step_behaviour(self.options, self.greeting.step, is_wrong)
+            return words if self.match else None
+        if is_wrong:
+            return None
+        answers = [(p.problem, p.answers) for p in self.probes]
+        stiffness = position_based.stiffness(answers, self.model)
+        if self.greeting.step.method is not None:
+            return stiffness
+        words = sentence("It behaves like {model}. Declare it with {declaration}.")
+        declaration = position_based.DECLARATION
+        return Sentence(words.template, {"model": self.description, "declaration": declaration})
+
+
+@dataclass(frozen=True)
+class _Declaration:
+    """A greeting that is compared by its text: there may be lists in it."""
+
+    text: str
+    greeting: Greeting = field(compare=False)
+
+
+def recognise(exchanges: Sequence[Exchange], greeting: Greeting) -> Recognition:
+    """Return the step that answers are of; it is sought once for a verdict and its cause."""
+    return _recognise(tuple(exchanges), _Declaration(repr(greeting), greeting))
+
+
+@lru_cache(maxsize=4)
+def _recognise(exchanges: tuple[Exchange, ...], declaration: _Declaration) -> Recognition:
+    greeting = declaration.greeting
+    problems = problems_of(exchanges, greeting)
+    probes = probes_of(exchanges, problems, every=True)
     is_constant = repeats(exchanges, 0.0) or repeats(exchanges, 1.0)
-    return [] if is_constant else probes_of(exchanges, problems)
-
-
-def _judge_all(
-    exchanges: Sequence[Exchange],
-    problems: Mapping[str, SpringProblem],
-    greeting: Greeting,
-    match: Sequence[Option],
-) -> list[CaseJudgement]:
-    """Return the judgements of all answers, by the step that is declared or recognised."""
+    telling = [] if is_constant else probes_of(exchanges, problems)
+    search, match, method = ModelSearch(telling, greeting), (), greeting.step.method
+    if method != position_based.METHOD:
+        match = search.run(probes)
     options = honest_options(match, greeting)
-    recognised = greeting.step.method is not None or bool(match)
-    return [
-        _judge_case(
-            exchange, exchanges, problems[exchange.case.name], greeting, options, recognised
-        )
-        for exchange in exchanges
-    ]
+    model, answers = model_of(options), [(p.problem, p.answers) for p in telling]
+    is_position_based = method == position_based.METHOD or (
+        method is None and not match and position_based.is_shown(answers)
+    )
+    if is_position_based:
+        model = position_based.flight_model(greeting.step, answers)
+    return Recognition(
+        exchanges, greeting, problems, telling, probes, match, options, model, is_position_based,
+        search.is_double(),
+    )  # fmt: skip
 
 
 def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, SpringProblem]:
@@ -112,6 +163,8 @@ def problems_of(exchanges: Sequence[Exchange], greeting: Greeting) -> dict[str, 
 def describe_model(options: Sequence[Option]) -> Sentence:
     """Return a model in words."""
     parts = {option.aspect: option.sentence for option in options}
+    if model_of(options).scaling != Scaling():
+        parts["damper"] = parts["scaling"]
     names = ("integrator", "substeps", "damper", "pins", "velocity")
     return sentence(
         "{integrator} ({substeps}, {damper}, {pins}, {velocity})",
@@ -119,54 +172,56 @@ def describe_model(options: Sequence[Option]) -> Sentence:
     )
 
 
-def declaration_of(options: Sequence[Option]) -> str:
-    """Return the field of a greeting that declares a model, "" if the protocol has none for it."""
-    fields = {name: value for option in options for name, value in option.fields.items()}
-    integrator, pins = fields["integrator"], fields["pins"].split()[0]
+def step_fields(model: StepModel) -> dict[str, Any]:
+    """Return the fields of a greeting that declare a model, None those that it has not."""
+    integrator, pins, factor = model.integrator, model.pin_kind, model.scaling.factor
     method, is_iterative = integrator.method, integrator.method in ITERATIVE
     if method == "newton" and integrator.iterations == 1:
         method = "linearised"
-    step = {
+    is_scaled = factor != 1.0 and model.damper == "none"
+    return {
         "method": "symplectic" if method in SYMPLECTIC else method,
-        "order": "positions_first" if method == "positions_first" else None,
+        "order": SYMPLECTIC.get(method),
         "start": integrator.start if is_iterative else None,
         "iterations": integrator.iterations if is_iterative else None,
-        "substeps": fields["substeps"],
-        "damper": fields["damper"],
-        "pins": {"springs": "penalty", "weightless": "heavy"}.get(pins, pins),
-        "velocity": fields["velocity"],
+        "substeps": model.substeps,
+        "damper": "global_factor" if is_scaled else model.damper,
+        "damping_factor": factor if is_scaled else None,
+        "pins": next((name for name, kinds in PINS.items() if pins in kinds), pins),
+        "velocity": model.velocity,
     }
-    if fields["scaling"] != 1.0:
-        if fields["damper"] != "none":
-            return ""
-        step |= {"damper": "global_factor", "damping_factor": fields["scaling"]}
-    step = {name: value for name, value in step.items() if value is not None}
+
+
+def declaration_of(model: StepModel) -> str:
+    """Return the field of a greeting that declares a model, "" if the protocol has none for it."""
+    fields = step_fields(model)
+    if fields["order"] == "velocities_first":
+        fields["order"] = None
+    step = {name: value for name, value in fields.items() if value is not None}
+    is_undeclared = model.scaling.factor != 1.0 and fields["damping_factor"] is None
     try:
         msgspec.convert(step, Step)
     except msgspec.ValidationError:
         return ""
-    return json.dumps({"step": step})[1:-1]
+    return "" if is_undeclared else json.dumps({"step": step})[1:-1]
 
 
 def _judge_case(
-    exchange: Exchange,
-    exchanges: Sequence[Exchange],
-    p: SpringProblem,
-    greeting: Greeting,
-    options: tuple[Option, ...],
-    recognised: bool,
+    exchange: Exchange, exchanges: Sequence[Exchange], recognition: Recognition
 ) -> CaseJudgement:
-    case, answer = exchange.case, exchange.answer
+    case, answer, greeting = exchange.case, exchange.answer, recognition.greeting
+    p, model, is_known = recognition.problems[case.name], recognition.model, recognition.is_known
     if not isinstance(answer, Answer):
         return CaseJudgement(case, answer, (), {})
-    model = model_of(options)
-    expected, positions = predicted(p, model), answer.values.get("positions")
+    predict = position_based.flight if recognition.is_position_based else predicted
+    expected, positions = predict(p, model), answer.values.get("positions")
     context = StepContext(
-        p, answer.values, rounding(p, model, greeting.epsilon), model, recognised,
-        describe_model(options), expected, greeting.step,
+        p, answer.values, rounding(p, model, greeting.epsilon), model, is_known,
+        recognition.description, expected, greeting.step,
     )  # fmt: skip
+    is_predicted = is_known and not recognition.is_position_based
     correct_digits = None
-    if recognised and expected and positions is not None:
+    if is_predicted and expected and positions is not None:
         gap = float(np.abs(expected["positions"] - positions).max())
         if np.isfinite(gap):
             correct_digits = digits(gap, float(np.abs(expected["positions"]).max()))
@@ -176,9 +231,17 @@ def _judge_case(
         + SOLVED * float(np.abs(answer.values.get(name, origin) - origin).max(initial=0.0))
         for name, origin in (("positions", p.positions), ("velocities", 0.0))
     }
+    judge = position_based.findings if recognition.is_position_based else _findings
+
+    def findings(outputs: Mapping[str, Any]) -> list[Finding]:
+        invalid = [name for name, numbers in outputs.items() if not np.isfinite(numbers).all()]
+        if invalid:
+            return [laws.not_finite(case, ", ".join(invalid))]
+        return judge(exchange, exchanges, context, allowed)
+
     judgement = judge_case(
-        exchange, lambda outputs: _findings(exchange, exchanges, context, allowed), allowed,
-        partial(_reference_step, p, model), expected if recognised else {}, correct_digits,
+        exchange, findings, allowed,
+        partial(_reference_step, p, model), expected if is_predicted else {}, correct_digits,
     )  # fmt: skip
     steps = (p.steps or 1) * (model.substeps if model.integrator.explicit else 1)
     return replace(judgement, reference_seconds=steps * (judgement.reference_seconds or 0.0))
@@ -191,15 +254,10 @@ def _findings(
     allowed: Mapping[str, float],
 ) -> list[Finding]:
     """Return the findings of all laws that apply."""
-    outputs = context.answers.items()
-    invalid = [name for name, numbers in outputs if not np.isfinite(numbers).all()]
-    if invalid:
-        return [laws.not_finite(exchange.case, ", ".join(invalid))]
     findings = [law(context) for law in LAWS]
     if exchange.case.facts.get("consistent") and not laws.keeps_declaration(context):
         findings.append(laws.consistency(context))
-    if context.model.damper != "diagonal":
-        findings.append(laws.symmetry(exchange, exchanges, allowed))
+    findings.append(laws.symmetry(exchange, exchanges, allowed))
     return [entry for entry in findings if entry is not None]
 
 
@@ -213,11 +271,11 @@ def _reference_step(p: SpringProblem, model: StepModel) -> State:
 
 def step_behaviour(options: Sequence[Option], step: Step, is_wrong: bool) -> Sentence | None:
     """Return the honest model that answers are of, None if it is the one that is declared."""
-    is_open = _leaves_open(step, options)
-    integrator = model_of(options).integrator
-    if not is_open and integrator.hessian == "exact":
+    model = model_of(options)
+    is_open = _leaves_open(step, model)
+    if not is_open and model.integrator.hessian == "exact":
         return None
-    declaration = declaration_of(options) if is_open and not is_wrong else ""
+    declaration = declaration_of(model) if is_open and not is_wrong else ""
     return sentence(
         "In small cases it behaves like {model}, with which it is compared."
         if is_wrong
@@ -229,36 +287,28 @@ def step_behaviour(options: Sequence[Option], step: Step, is_wrong: bool) -> Sen
     )
 
 
-def repeats(asked: Sequence[Exchange] | Sequence[CaseJudgement], factor: float) -> bool:
-    """Return whether all answers are the positions of their requests times a factor."""
-    pairs = [
-        (factor * item.case.inputs["positions"], item.answer.values["positions"])
-        for item in asked
-        if isinstance(item.answer, Answer) and "positions" in item.answer.values
-    ]
-    return bool(pairs) and all(np.allclose(before, after, atol=SOLVED) for before, after in pairs)
-
-
-def _leaves_open(step: Step, options: Sequence[Option]) -> bool:
+def _leaves_open(step: Step, model: StepModel) -> bool:
     """Return whether a greeting leaves something open that is not as usual."""
-    fields = {name: value for option in options for name, value in option.fields.items()}
-    integrator = fields["integrator"]
-    order = SYMPLECTIC["symplectic"]
-    usual = {"substeps": 1, "velocity": VELOCITY_OF[integrator.explicit], "order": order}
-    fields["order"] = SYMPLECTIC.get(integrator.method, order)
-    is_counted = integrator.method in ITERATIVE and step.method == integrator.method
+    is_counted = step.method in ITERATIVE and step.method == model.integrator.method
     if is_counted and step.iterations is None:
         return True
+    velocity = "separate" if model.integrator.explicit else "displacement"
+    usual = {"substeps": 1, "velocity": velocity, "order": "velocities_first"}
+    fields = step_fields(model)
     return any(
-        getattr(step, name) is None and (name not in usual or fields[name] != usual[name])
-        for name in _DECLARED
+        getattr(step, name) is None and fields[name] not in (None, usual.get(name))
+        for name in ("method", "order", "substeps", "damper", "pins", "velocity")
     )
 
 
-# The usual velocity of implicit and of explicit methods.
-VELOCITY_OF = ("displacement", "separate")
-# What a greeting may say of its step; anything else is inferred.
-_DECLARED = ("method", "order", "substeps", "damper", "pins", "velocity")
+def repeats(answered: Sequence[Exchange] | Sequence[CaseJudgement], factor: float) -> bool:
+    """Return whether all answers are the positions of their requests times a factor."""
+    pairs = [
+        (factor * item.case.inputs["positions"], item.answer.values["positions"])
+        for item in answered
+        if isinstance(item.answer, Answer) and "positions" in item.answer.values
+    ]
+    return bool(pairs) and all(np.allclose(before, after, atol=SOLVED) for before, after in pairs)
 
 
 def first_broken_step(judgements: Sequence[CaseJudgement]) -> Sentence | None:
