@@ -73,7 +73,7 @@ def test_forces_are_those_of_the_formula_and_add_up_to_the_weight_to_rounding(
     expected, allowed = all_forces(spring), forces.tolerance(spring, EPSILON)
     given = expected.copy()
     given[1, 2] += share * allowed
-    found = forces._formula(spring, given, expected, allowed)
+    found = forces._formula(given, expected, allowed)
     assert (found.verdict, found.index) == (verdict, 1)
     given = expected.copy()
     given[:, 1] += share * allowed * np.sqrt(2.0)

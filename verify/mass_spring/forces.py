@@ -8,7 +8,6 @@ import numpy as np
 
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import forces as reference_forces
-from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
 from ..exchange import Answer, Exchange
@@ -17,20 +16,11 @@ from ..judgement import CaseJudgement, Diagnosis, Finding, TaskReport, first_bro
 from ..laws import digits, finding, hints_of, judge_case
 from .cases import task_cases
 from .laws import not_finite, symmetry
-from .problem import (
-    SpringProblem,
-    damper_forces,
-    problem_of,
-    spring_forces,
-    state_of,
-    system_of,
-)
+from .problem import SpringProblem, problem_of, state_of, system_of
 
 TASK = "mass_spring_forces"
 # Rounding of a length by the coordinates' epsilon, times the stiffness, and of some ten terms.
 ROUNDINGS = 8.0
-# An error is like a force if the cosine of the angle between them is larger.
-ALIKE = 0.7
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
@@ -72,7 +62,7 @@ def _judge_case(
         if not np.isfinite(output).all():
             yield not_finite(case, "forces")
             return
-        yield _formula(p, output, forces, allowed)
+        yield _formula(output, forces, allowed)
         yield _balance(p, output, allowed)
         yield from filter(None, [symmetry(exchange, exchanges, {"forces": 2.0 * allowed})])
 
@@ -83,30 +73,9 @@ def _judge_case(
     return judge_case(exchange, findings, 2.0 * allowed, reference, expected, correct_digits)
 
 
-def _formula(p: SpringProblem, output: FloatArray, expected: FloatArray, allowed: float) -> Finding:
-    gap, term = np.abs(output - expected).max(axis=1), _likeness(p, output - expected)
-    return finding("force formula", gap.max(), allowed, index=int(gap.argmax()), term=term)
-
-
-def _likeness(p: SpringProblem, error: FloatArray) -> Sentence:
-    """Return which term's force looks most like the error."""
-    x, v = p.positions, p.velocities
-    terms = (
-        (p.constant, sentence("(the error resembles gravity)")),
-        (spring_forces(p, x), sentence("(the error resembles the spring forces)")),
-        (damper_forces(p, x, v), sentence("(the error resembles the damper forces)")),
-    )
-    size = np.linalg.norm(error)
-    cosines = [
-        abs(float((force * error).sum())) / max(float(np.linalg.norm(force) * size), 1e-300)
-        for force, _ in terms
-    ]
-    best = int(np.argmax(cosines))
-    return (
-        terms[best][1]
-        if cosines[best] > ALIKE
-        else sentence("(the error resembles no single term)")
-    )
+def _formula(output: FloatArray, expected: FloatArray, allowed: float) -> Finding:
+    gap = np.abs(output - expected).max(axis=1)
+    return finding("force formula", gap.max(), allowed, index=int(gap.argmax()))
 
 
 def _balance(p: SpringProblem, output: FloatArray, allowed: float) -> Finding:
