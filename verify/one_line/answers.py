@@ -1,4 +1,4 @@
-"""Which answers are compared with programs, and how a right program answers them."""
+"""The answers to compare with programs, and the answers of right programs."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
@@ -17,33 +17,32 @@ from ..laws import LAWS
 from .mutants import Program
 from .right_programs import comparable
 
-# The most small and large wrong answers, and small right ones, that are compared with programs; a
-# program has to give the first of them.
+# The largest numbers of small and large wrong answers, and small right answers, for comparison. A
+# program has to give the first answer.
 SMALL, LARGE, TRIAL = 9, 3, 1
 # Of quarter turns rounding decides which of equal components a quaternion is made of.
 TRIAL_OF_QUARTERS = 6
-# So many answers a right program has to miss before its lines are changed, or, if they keep all
-# laws, before any mistake is named: fewer would be met by many changes by chance.
+# A right program has to miss this number of answers before its lines are changed. Answers within
+# all laws need as many before any mistake is named: many changes meet fewer by chance.
 MIN_DIFFERENT = 3
-# Cases for which a right program goes through its loops more often are left out: they take long,
-# unless a pass is along a curve. A known fault may have loops that the right program lacks.
+# Cases with more passes of a right program through its loops are left out for their time, unless a
+# pass is along a curve. A known fault may have additional loops.
 MAX_PASSES, OF_CURVES = 200, 2000
-# But not if they go as often through them for the shortest case, as a constant number of sweeps.
+# Cases stay if the shortest case has as many passes, like a constant number of sweeps.
 LONGER = 3
-# A cause would be any that is as near, where a wrong answer is as near to the right one as so many
-# tolerances.
+# A wrong answer within so many tolerances of the right answer would fit too many causes.
 NEAR = 3.0
-# The law of sweeps that are neither the textbook's nor those of a known honest program.
+# The law of sweeps unlike the textbook's and all known honest programs'.
 ANOTHER = "one sweep, another"
-# The input that asks for a single iteration of a solver.
+# The input for a single iteration of a solver.
 ITERATIONS = "max_iterations"
 
 
 def doubtful_answers(report: TaskReport) -> tuple[list[CaseJudgement], bool]:
-    """Return answers that keep all laws but may be a mistake's, and whether it is a known one.
+    """Return doubtful answers within all laws, and whether their mistake is known.
 
-    These are sweeps that differ from the textbook's, or else solves that end short of the nearest
-    point, or else all sweeps within limits where all targets are reached.
+    These are sweeps unlike the textbook's, or else solves short of the nearest point. Without both,
+    these are all sweeps within limits where all targets are reached.
     """
     sweeps = [j for j in report.judgements if j.case.requirement == "must" and _is_single(j)]
     differing = [
@@ -68,7 +67,7 @@ def _misses(judgement: CaseJudgement, law: str) -> bool:
 
 
 def _is_of_another(entry: Finding) -> bool:
-    """Return whether a sweep is not the textbook's, nor that of a known honest program."""
+    """Return whether a sweep is neither the textbook's nor a known honest program's."""
     return bool(entry.verdict) and entry.sentence.template == LAWS[ANOTHER]["sentence"]
 
 
@@ -115,9 +114,9 @@ def _repeats(output: Any, array: Any) -> bool:
 
 
 def with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
-    """Return answers with the number of sweeps that they have, whatever was asked.
+    """Return answers with their real number of sweeps in place of the requested number.
 
-    They are of requests without a tolerance, which a solver may not read either.
+    Answers to requests with a tolerance are left out: a solver may ignore tolerances as well.
     """
     return [
         replace(e, case=replace(e.case, inputs={**e.case.inputs, ITERATIONS: count}))
@@ -129,7 +128,7 @@ def with_sweeps(compared: Sequence[Exchange], count: int) -> list[Exchange]:
 def without_near(
     compared: Sequence[Exchange], report: TaskReport, tolerance: float
 ) -> list[Exchange]:
-    """Return answers without the wrong ones that are too near to right ones to tell a cause."""
+    """Return answers without wrong answers too near to right answers to tell a cause."""
     near = {
         j.case.name
         for j in report.judgements
@@ -152,7 +151,7 @@ def compare(
     compared: Sequence[Exchange],
     tolerance: float,
 ) -> tuple[list[Exchange], list[Exchange], dict[str, int]]:
-    """Return the answers that a right program does not give, the answers that it gives, and passes.
+    """Return the answers unlike a right program's, the equal answers, and the passes.
 
     The passes through its loops are by the names of cases; answers of too many are left out.
     """
@@ -166,13 +165,13 @@ def compare(
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
             (same if is_same else different).append(exchange)
-    # Single iterations of another solver differ everywhere: they decide soon.
+    # Single iterations of another solver differ everywhere, and decide soon.
     single = [exchange for exchange in different if exchange.case.inputs.get(ITERATIONS) == 1]
     return (single if len(single) >= MIN_DIFFERENT else different), same, passes
 
 
 def telling_answers(different: Sequence[Exchange], same: Sequence[Exchange]) -> list[Exchange]:
-    """Return answers that a program does not give, then no more of the others."""
+    """Return answers unlike a program's, then at most as many equal answers."""
     return [*different, *same[: max(len(different), MIN_DIFFERENT)]]
 
 

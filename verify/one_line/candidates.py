@@ -1,4 +1,4 @@
-"""The known faults, changed lines and changed numbers of programs that give answers."""
+"""The known faults, changed lines and changed numbers of programs with a solver's answers."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -26,20 +26,20 @@ from .mutants import Mutant, Program
 from .right_programs import answer_of, faults_in
 from .sentences import changes_in_words
 
-# The share of the answers that a program has to give.
+# The share of the answers for a match.
 MIN_SHARE = 0.75
 # The changes of which each two are tried at once, in each program.
 MAX_IN_PAIRS = 12
 # Of a right step, which takes longer.
 MAX_MUTANTS_OF_STEPS = 2_000
-# Programs of these answer in conventions of their own: what they share is changed in each.
+# Programs of these tasks answer in conventions of their own: shared lines are changed in each.
 OF_STEPS = ("mass_spring_step", "mass_spring_motion")
-# The functions of programs with fitted constants that forward kinematics shows to be right.
+# The functions with right results by forward kinematics, of programs with fitted constants.
 FOUNDATIONS = ("multiply", "conjugate", "rotate", "kinematics")
-# Relative differences that rounding and the ends of iterations explain, by precision.
+# Relative differences by rounding and the ends of iterations, by precision.
 TOLERANCE = {"double": 1e-7, "single": 2e-4}
-# In single precision a change may enlarge rounding, up to so many times the tolerance: inputs in it
-# move its answers by a part, and its own steps by so many times as much.
+# In single precision a change may enlarge rounding, up to so many times the tolerance. Rounded
+# inputs move its answers by a part, and its own steps by this multiple.
 ROUNDINGS, MOST_ENLARGED = 30.0, 50.0
 NO_ANSWER = (ValueError, IndexError, ArithmeticError, np.linalg.LinAlgError)
 
@@ -47,7 +47,7 @@ NO_ANSWER = (ValueError, IndexError, ArithmeticError, np.linalg.LinAlgError)
 def run_of(
     program: Program, report: TaskReport, compared: Sequence[Exchange]
 ) -> Callable[[Case], Mapping[str, Any]]:
-    """Return the function that gives the answers of a program, its constants fitted to a solver."""
+    """Return the function with the answers of a program, its constants fitted to a solver."""
     run = partial(answer_of, program, report.method)
     if not is_fitted(program):
         return run
@@ -63,11 +63,11 @@ def of_program(
     tolerance: float,
     functions: set[str] | None,
 ) -> tuple[Explanation, ...]:
-    """Return the faults or changed lines of a program that give answers, most answers first.
+    """Return the faults or changed lines of a program with given answers, most answers first.
 
-    Answers that the program gives as it is come last, and no more of them than of the others: they
+    Answers of the unchanged program come last, and at most as many as other answers: equal answers
     do not speak for a change. Lines are changed where no known fault gives all answers, except in
-    `functions` that are changed already, or in none.
+    already changed `functions`, or in none.
     """
     run = run_of(program, report, compared)
     different, same, passes = compare(program, run, compared, tolerance)
@@ -79,7 +79,7 @@ def of_program(
     faults, mutants = dict[str, CodedFault](), dict[str, Mutant]()
 
     def variants() -> Iterator[Variant]:
-        # of fitted programs known faults have been tried before, in all of them
+        # known faults of all fitted programs have been tried before
         is_tried = is_fitted(program) and functions is not None
         known = () if is_tried else faults_in(program.source, report.task, report.method)
         for fault in known:
@@ -115,7 +115,7 @@ def of_program(
 def of_entries(
     entries: Sequence[Entry], report: TaskReport, compared: Sequence[Exchange], tolerance: float
 ) -> tuple[Explanation, ...]:
-    """Return the entry of a dictionary that gives most answers, () if too few."""
+    """Return the entry of a dictionary with most answers, () if too few."""
     best = tuple[Explanation, ...]()
     by_program = dict[str, list[Entry]]()
     for entry in entries:
@@ -132,7 +132,7 @@ def of_entries(
 
 
 def _pairs(entries: Sequence[Entry]) -> list[ChangePair]:
-    """Return two changes at once, of the likeliest changes that requests propose."""
+    """Return two changes at once, of the likeliest proposed changes."""
     single = [entry for entry in entries if len(entry.codes) < 2]
     return [ChangePair(*pair) for pair in combinations(single[:MAX_IN_PAIRS], 2)]
 
@@ -144,7 +144,7 @@ def _of_changes(
     compared: Sequence[Exchange],
     tolerance: float,
 ) -> tuple[Explanation, ...]:
-    """Return the changes of a program that give answers, as `of_program` does."""
+    """Return the changes of a program with given answers, like `of_program`."""
     run = partial(answer_of, program, report.method)
     different, same, passes = compare(program, run, compared, tolerance)
     if not different:
@@ -191,7 +191,7 @@ def _names(entry: Entry, number: int, place: int) -> list[str]:
 
 
 def _sentences_of(entry: Entry) -> list[Sentence]:
-    """Return the sentences of known faults, or that of a changed line."""
+    """Return the sentences of known faults, or the sentence of a changed line."""
     faults = [coded_faults()[code] for code in entry.codes]
     if faults:
         return [with_code(fault.code, fault.sentence) for fault in faults]
@@ -205,7 +205,7 @@ def _answer_of_change(
     compared: Sequence[Exchange],
     passes: Mapping[str, int],
 ) -> Callable[[Case], Mapping[str, Any]]:
-    """Return the function that answers as a change of a program, or two at once."""
+    """Return the function with the answers of a change of a program, or of two at once."""
     if isinstance(change, ChangePair) or change.codes:
         wrong = change.changed_program()
         return partial(_faulty_answer, wrong, run_of(wrong, report, compared), passes)
@@ -230,7 +230,7 @@ def _enlargement(
 
 
 def _rounded(value: Any) -> Any:
-    """Return numbers in single precision, others as they are."""
+    """Return numbers in single precision, other values unchanged."""
     is_real = isinstance(value, np.ndarray) and value.dtype.kind == "f"
     return value.astype(np.float32).astype(float) if is_real else value
 

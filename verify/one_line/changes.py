@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-# Functions that are taken for one another, and comparisons.
+# Functions with similar names or purposes, and comparisons.
 FUNCTIONS = (
     ("sin", "cos"), ("arcsin", "arccos"), ("asin", "acos"), ("min", "max"), ("ceil", "floor"),
     ("degrees", "radians"), ("zeros", "ones"), ("sum", "mean"), ("repeat", "tile"),
@@ -24,11 +24,11 @@ COMPARISONS = (ast.Lt, ast.LtE, ast.Gt, ast.GtE)
 PATTERNS = tomllib.loads(Path(__file__).with_name("patterns.toml").read_text(encoding="utf-8"))
 # Numbers below are tolerances, in the place of which stand these.
 TOLERANCE, TOLERANCES = 1e-5, [10.0**-i for i in range(1, 11)]
-# The parts of a list that a wrong slice or loop goes through.
+# The parts of a list in a wrong slice or loop.
 PARTS = {"loop": ("1:", ":-1", ":2", ":3", ":4", ":5", ":10"), "direction": ("::-1",)}
 NUMBER, WORD = "()", re.compile(r"\w+(\.\d+)?")
 
-# The name of a number that answers tell.
+# The name of a fitted number.
 CONSTANT = "_constant"
 
 Change = tuple[str, ast.expr]  # the kind, and what an expression becomes
@@ -37,13 +37,13 @@ Rearrangement = tuple[str, str, list[ast.stmt]]
 
 
 class Scope(NamedTuple):
-    """The expressions of a function with values that were seen."""
+    """The expressions of a function with observed values."""
 
     shapes: Mapping[str, str]  # by the text of an expression: "int", "()", "(3,)", "list"
     plain: frozenset[str]  # the texts of names and of elements x[i]
 
     def alike(self, text: str) -> list[str]:
-        """Return the other names and elements that have the shape of an expression."""
+        """Return the other names and elements of an expression's shape."""
         shape = self.shapes.get(text)
         return [
             name for name in sorted(self.plain) if name != text and self.shapes.get(name) == shape
@@ -120,7 +120,7 @@ def _other_operators(node: Any) -> Iterator[Change]:
 
 
 def _bounds(node: Any, parent: ast.AST) -> Iterator[Change]:
-    """Yield a slice without its bounds, with others, or a loop that is shorter or reversed."""
+    """Yield a slice without its bounds, with other bounds, or a shorter or reversed loop."""
     if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Slice):
         yield "loop", node.value
         items = f"({ast.unparse(node.value)})"
@@ -187,14 +187,14 @@ def _names(text: str, scope: Scope) -> Iterator[Change]:
 
 
 def _neighbours(text: str, parent: Any, scope: Scope) -> Iterator[Change]:
-    """Yield an index of the next or the last item, and of the one before or the first."""
+    """Yield an index of the next or the last item, and of the item before or the first."""
     if isinstance(parent, ast.Subscript) and scope.shapes[text] == "int":
         yield "index", parsed(f"min({text} + 1, len({ast.unparse(parent.value)}) - 1)")
         yield "index", parsed(f"max({text} - 1, 0)")
 
 
 def _of_one_form(text: str, scope: Scope) -> Iterator[str]:
-    """Yield the sums and products that differ from a text in names or numbers alone."""
+    """Yield sums and products with other names or numbers than a text's."""
     form = WORD.sub("", text)
     for other, shape in scope.shapes.items():
         is_alike = shape == scope.shapes[text] and WORD.sub("", other) == form
@@ -257,7 +257,7 @@ def of_statement(statements: list[ast.stmt], i: int) -> Iterator[Rearrangement]:
 
 
 def _in_place(statement: ast.Assign) -> Iterator[list[ast.stmt]]:
-    """Yield x[j] = f(x[p]) as lines that write the result over x[p], and let x[j] share it."""
+    """Yield x[j] = f(x[p]) as lines with the result in x[p], shared by x[j]."""
     target = statement.targets[0]
     if not isinstance(target, ast.Subscript):
         return
@@ -272,7 +272,7 @@ def _in_place(statement: ast.Assign) -> Iterator[list[ast.stmt]]:
 def _around_loop(
     loop: ast.For | ast.While, before: list[ast.stmt], after: list[ast.stmt]
 ) -> Iterator[Rearrangement]:
-    """Yield a loop that ends after its first pass, and lines moved into it or out of it."""
+    """Yield a loop with its first pass alone, and lines moved into or out of a loop."""
 
     def with_body(body: list[ast.stmt]) -> Any:
         values = {**dict(ast.iter_fields(loop)), "body": body, "lineno": 0}

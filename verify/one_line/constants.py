@@ -1,4 +1,4 @@
-"""The number that a changed line has, fitted to answers: c e or c + e in the place of e."""
+"""The number in a changed line, fitted to answers: c e or c + e in the place of e."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -13,9 +13,9 @@ from ..exchange import Answer, Exchange
 from .changes import CONSTANT
 from .mutants import Mutant, Program
 
-# The number of answers that a number is fitted to, of corrections, and the first change of it.
+# The number of answers for a fit, of corrections, and the first change of the fitted number.
 FITTED, CORRECTIONS, CHANGE = 2, 6, 0.25
-# A number this near to a fraction of a small denominator is that fraction.
+# A number this near to a fraction of a small denominator becomes the fraction.
 NEAR, DENOMINATOR = 1e-7, 100
 Run = Callable[[Case], Mapping[str, Any]]
 
@@ -27,7 +27,7 @@ def fitted(
     passes: Mapping[str, int],
     tolerance: float,
 ) -> Iterator[tuple[Mutant, float]]:
-    """Yield the changes with a number that give the first answers, and that number.
+    """Yield the changes with a number by the first answers, and the number.
 
     The program has been observed.
     """
@@ -67,7 +67,7 @@ def text_of(mutant: Mutant, number: float) -> Mutant:
 
 
 def _numbers(values: Mapping[str, Any], exchange: Exchange) -> FloatArray:
-    """Return the outputs that were answered, as one list."""
+    """Return the answered outputs as a single list."""
     assert isinstance(exchange.answer, Answer)
     return np.concatenate([np.ravel(values[name]) for name in exchange.answer.values])
 
@@ -95,6 +95,6 @@ def _root(gap: Callable[[float], FloatArray], start: float, tolerance: float) ->
 
 
 def _simple(number: float) -> float:
-    """Return the fraction of a small denominator that is very near, or the number."""
+    """Return a very near fraction of a small denominator, or the number."""
     fraction = float(Fraction(number).limit_denominator(DENOMINATOR))
     return fraction if abs(fraction - number) <= NEAR * max(1.0, abs(number)) else number

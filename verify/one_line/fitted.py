@@ -1,7 +1,7 @@
 """Programs with constants of a solver's own, fitted to each of its answers.
 
-The step of a Jacobian method, J^T (J J^T + m I)^-1 e, has a damping m and a factor that each solver
-chooses, or changes as it goes on. The other numbers of an answer tell programs apart.
+The step of a Jacobian method, J^T (J J^T + m I)^-1 e, has a damping m and a factor. Each solver
+chooses both, or changes both between steps. The other numbers of an answer tell programs apart.
 """
 
 import math
@@ -20,18 +20,18 @@ from .mutants import Program
 
 # The names of the constants in programs.
 STEP, DAMPING = "STEP", "DAMPING"
-# The logarithms of dampings from the pseudo-inverse to the transpose: rotations by any damping are
-# combinations of those by three, if they are small; and of dampings to begin with.
+# The logarithms of dampings from the pseudo-inverse to the transpose: small rotations by any
+# damping are combinations of rotations by three dampings. Then the initial dampings.
 LEAST, MOST = -25.0, 25.0
 DAMPINGS, BETWEEN = (0.0, LEAST, MOST), (-8.0, -6.0, -4.0, -2.0, 2.0, 4.0, 6.0, 8.0)
-# Rotations farther from these combinations, over their size, are of another program: large ones
-# by rules of the first order are this far. The nearest damping leaves less.
+# Rotations farther from these combinations, over their size, belong to another program: large
+# rotations by rules of the first order are this far. The nearest damping leaves less.
 FAR, NEAR = 0.3, 0.1
 # Levenberg and Marquardt's method, until the gap over the size of the rotations is rounding.
 METHOD: Mapping[str, Any] = {
     "method": "lm", "ftol": 1e-12, "xtol": 1e-12, "gtol": 1e-12, "max_nfev": 40,
 }  # fmt: skip
-# Steps in directions that differ by less have the same constants.
+# Steps in directions within this difference have the same constants.
 DECIMALS = 9
 
 Answers = Mapping[str, Mapping[str, Any]]  # the comparable outputs, by the names of cases
@@ -85,7 +85,7 @@ def fitted(
 
 
 def _turns(start: FloatArray, after: FloatArray) -> FloatArray:
-    """Return the rotation vectors of joints in their own frames, all in one array."""
+    """Return the rotation vectors of joints in their own frames, in a single array."""
     return rotation.logarithm(rotation.multiply(rotation.conjugate(start), after)).ravel()
 
 

@@ -1,4 +1,4 @@
-"""The programs that differ from a right program in a single line.
+"""The programs with a single line unlike a right program's.
 
 Whoever writes a known method down makes mistakes of few kinds: a wrong sign or index, a name for
 another, a line left out or in the wrong place.
@@ -29,19 +29,20 @@ from .changes import (
 
 T = TypeVar("T")
 FILE, PASS = "right program", "_pass"
-# A program is stopped after so many times the passes through loops of the right one.
+# A program is stopped after so many times the passes through loops of the right program.
 MAX_PASSES = 5
 UNLIMITED = 10**9
-# The functions that are called with a request.
+# The functions for requests.
 ENTRIES = {*TASKS, "ccd", "fabrik", "tool_step"}
 # What an expression raises whose names have no value yet, or not the usual one.
 NO_VALUE = (ArithmeticError, AttributeError, LookupError, NameError, TypeError, ValueError)
 
 
 class FastNumpy:
-    """NumPy with a cross product of two vectors that takes an eighth of the time.
+    """NumPy with a cross product of two vectors in an eighth of the time.
 
-    Programs of mechanics spend most of their time in it: their search is three times as fast.
+    Programs of mechanics spend most of their time in this product: their search is three times as
+    fast.
     """
 
     def __getattr__(self, name: str) -> Any:
@@ -49,7 +50,7 @@ class FastNumpy:
 
     @staticmethod
     def cross(a: Any, b: Any, **options: Any) -> Any:
-        """Return the cross product of two vectors, or of arrays of them as NumPy does."""
+        """Return the cross product of two vectors, or of arrays of vectors like NumPy."""
         if np.shape(a) != (3,) or np.shape(b) != (3,):
             return np.cross(a, b, **options)
         (a0, a1, a2), (b0, b1, b2) = a, b
@@ -67,7 +68,7 @@ class Mutant(NamedTuple):
 
 
 class Program:
-    """A right program that runs with any of its functions changed."""
+    """A right program, to run with any changed function."""
 
     def __init__(self, source: str) -> None:
         self.source = source
@@ -96,7 +97,7 @@ class Program:
         self.names |= constants
 
     def with_source(self, source: str) -> "Program":
-        """Return another program with the same choices; raise SyntaxError if it is none."""
+        """Return another program with the same choices; raise SyntaxError of invalid source."""
         program = Program(source)
         program.choose(self._choices)
         return program
@@ -112,7 +113,7 @@ class Program:
         return run(), self._passes
 
     def text_of(self, function: str) -> str:
-        """Return the source of a function, with the change of a mutant while it is yielded."""
+        """Return the source of a function, with the change of the yielded mutant."""
         return next(ast.unparse(part) for part in self._functions if part.name == function)
 
     def mutant_of(self, kind: str, function: str, right: str, wrong: str, text: str) -> Mutant:
@@ -128,7 +129,7 @@ class Program:
 
     @contextmanager
     def within(self, passes: int) -> Iterator[None]:
-        """Run the program, or stop it long after the passes that the right program takes."""
+        """Run the program, or stop long after the passes of the right program."""
         self._passes, self._max_passes = 0, MAX_PASSES * (passes + 1)
         try:
             yield
@@ -137,7 +138,7 @@ class Program:
 
     @contextmanager
     def changed(self, mutant: Mutant, passes: int) -> Iterator[None]:
-        """Run the program with a change, given the passes that the right program takes."""
+        """Run the program with a change, given the passes of the right program."""
         right = self.names[mutant.function]
         self.names[mutant.function] = mutant.changed
         try:
@@ -178,9 +179,9 @@ class Program:
             self._scopes[function] = Scope(shapes_here, plain)
 
     def mutants(self, functions: set[str]) -> Iterator[Mutant]:
-        """Yield each change of a line of the functions that were observed.
+        """Yield each change of a line of the observed functions.
 
-        `functions` are those changed already, in programs that share them: they are left out.
+        Functions in `functions` are left out: programs with the same functions had these changes.
         """
         for function in self._functions:
             text = ast.unparse(function)
@@ -197,7 +198,7 @@ class Program:
     def _of_block(
         self, function: ast.FunctionDef, block: Any, changes: Callable[..., Iterator[Change]]
     ) -> Iterator[Mutant]:
-        """Yield the changes of the statements of a block, and of the statements within them."""
+        """Yield the changes of the statements of a block, and of inner statements."""
         for name in ("body", "orelse"):
             statements = getattr(block, name, [])
             for i, statement in enumerate(statements):
@@ -235,7 +236,7 @@ class Program:
     def _mutant(
         self, function: ast.FunctionDef, change: tuple[str, str, str], place: Any, new: Any
     ) -> Iterator[Mutant]:
-        """Yield a change, unless Python refuses it: a `break` outside of its loop."""
+        """Yield a change, unless Python refuses the line: a `break` outside of its loop."""
         kind, right, wrong = change
         names = dict[str, Any]()
         for node in new if isinstance(new, list) else [new]:
@@ -248,7 +249,7 @@ class Program:
 
 
 def _expressions(node: ast.AST) -> Iterator[tuple[ast.AST, Any, Any]]:
-    """Yield the expressions of a statement: the node that holds each, where, and the expression."""
+    """Yield the expressions of a statement, each after its parent node and its place there."""
     for name, value in ast.iter_fields(node):
         for key, part in enumerate(value) if isinstance(value, list) else [(None, value)]:
             if not isinstance(part, ast.AST) or isinstance(part, ast.stmt | ast.arguments):

@@ -22,22 +22,23 @@ from .mutants import Program
 
 _TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
 FAULTS = _TABLE["line"]
-# The names of all faults that only the lines of programs tell.
+# The names of all faults by lines of programs alone.
 BY_LINES = {*FAULTS, *_TABLE["known"]}
-# Of changes that no answer tells apart the first of these kinds is named.
+# The first of these kinds is named for changes with equal answers.
 KINDS = list(FAULTS)
-# The tasks whose known faults programs of a task may have; those of steps have all of robots.
+# The tasks whose known faults programs of a task may have; programs of steps have all faults of
+# robots.
 FOUNDATIONS = BUILDS_ON | {tool_steps.TASK: (*BUILDS_ON["robot_track"], "robot_track")}
 # The declaration of programs of Jacobian methods.
 JACOBIAN = '"methods": ["jacobian"]'
-# Fields of a declared step that constants of a program may have.
+# Fields of a declared step in constants of a program.
 CHOICES = ("method", "order", "start", "iterations", "substeps", "damper")
 # Faults of these families are named in other ways than by the lines of a program.
 SELF_NAMED = ("LINE", "STATE")
 
 
 def faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
-    """Return the known faults of a task, and of those it builds upon, whose lines a program has."""
+    """Return the known faults of a task and its foundations, whose lines a program has."""
     return [
         fault
         for fault in coded_faults().values()
@@ -54,7 +55,7 @@ def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
 
 
 def is_of(program: str, task: str, method: str) -> bool:
-    """Return whether a right program has a task, and a method of it.
+    """Return whether a right program has a task, and a method of this task.
 
     A Jacobian method has a name of its solver's own; the program's stands in its declaration.
     """
@@ -64,7 +65,7 @@ def is_of(program: str, task: str, method: str) -> bool:
 
 
 def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
-    """Yield the right programs of a task that have its method and the declared step."""
+    """Yield the right programs of a task with its method and the declared step."""
     for name, entry in PROGRAMS.items():
         if not is_of(name, task, method) or not entry.get("searched", True):
             continue
@@ -82,7 +83,7 @@ def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
 def _in_undeclared_choices(
     program: Program, chosen: Mapping[str, Any], undeclared: Mapping[str, Sequence[Any]]
 ) -> Iterator[Program]:
-    """Yield a program with each combination of the choices that a greeting leaves open."""
+    """Yield a program with each combination of a greeting's open choices."""
     values = {name: each for name, each in undeclared.items() if name not in chosen}
     for combination in product(*values.values()):
         variant = Program(program.source)
@@ -112,7 +113,7 @@ def comparable(exchange: Exchange) -> Exchange:
 
 
 def answer_of(program: Program, method: str, case: Case) -> Mapping[str, Any]:
-    """Return the comparable outputs of a right program; raise ArithmeticError if it has none."""
+    """Return the comparable outputs of a right program; raise ArithmeticError without an answer."""
     if case.task == tool_steps.TASK:
         return tool_steps.answer_of(program, case)
     function = program.names.get(method) or program.names.get(case.task)

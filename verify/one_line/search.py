@@ -1,4 +1,4 @@
-"""Search the right program with a known fault, or a changed line, that gives wrong answers."""
+"""Search the right program whose known fault or changed line gives wrong answers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -24,15 +24,15 @@ from .fitted import is_fitted
 from .mutants import Program
 from .right_programs import answer_of, programs_of
 
-# No further right program is changed after so many changes, of half a millisecond each; where
-# changes are looked up, few are left that only a search finds.
+# No further right program is changed after so many changes, of half a millisecond each; beside a
+# dictionary, only a search finds the few remaining changes.
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics", *OF_STEPS)
-# The tasks whose answers tell numbers: they take no iterations.
+# The tasks whose answers tell numbers, without iterations.
 WITH_NUMBERS = ("mass_spring_forces", "energy", *OF_STEPS)
 # Where a right answer to all requests of the dictionary leaves known faults of rare cases alone.
 RARE_ELSEWHERE = ("mass_spring_forces", "energy")
-# Of right steps, so many that come nearest are tried with known faults, and with changed lines.
+# So many of the nearest right steps are tried with known faults, and with changed lines.
 NEAREST_KNOWN, NEAREST = 8, 2
 
 
@@ -42,10 +42,10 @@ def with_changed_line(
     connection: Connection | None = None,
     known_alone: bool = False,
 ) -> TaskReport:
-    """Return a report on wrong answers with the fault or changed line that explains them.
+    """Return a report on wrong answers with the explaining fault or changed line.
 
-    Beside a mistake that explains most answers, or where all targets are reached, the search is for
-    known faults that explain all; so it is if `known_alone`, among those that are looked up. A
+    Beside a mistake behind most answers, or where all targets are reached, known faults have to
+    explain all answers. If `known_alone`, the search is for known faults of the dictionary. A
     `connection` can be asked for what a dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
@@ -81,7 +81,7 @@ def with_changed_line(
 
 
 def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
-    """Return the change of a line that gives the steps of robots, a known fault before others.
+    """Return the change of a line with the steps of robots, a known fault before other changes.
 
     Other lines are changed in the first view alone: single steps show more than where solves end.
     """
@@ -93,10 +93,10 @@ def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[E
 
 
 def _least_share(report: TaskReport) -> float:
-    """Return the share of answers that a program has to explain: many more than what is named.
+    """Return the share of answers for a program to explain: many more than by the named mistake.
 
-    It has to explain all where answered positions are named, or how limits are read: a program
-    tells of rotations as well. So it has where a measured test ends solves.
+    A program has to explain all beside named positions or readings of limits, since a program tells
+    of rotations as well. Beside a measured test at the ends of solves, all answers count too.
     """
     named = report.diagnosis.explanations
     faults = {fault for explanation in named for fault in explanation.faults}
@@ -115,7 +115,7 @@ def changed_lines(
     is_known: bool = False,
     proposals: Proposals | None = None,
 ) -> tuple[Explanation, ...]:
-    """Return the change of a line that gives most wrong or doubtful answers, () if too few.
+    """Return the change of a line with most wrong or doubtful answers, () if too few.
 
     If `is_known`, the search is for known faults alone. Where a dictionary proposes changes, these
     are tried; the lines of its first program, if answers to all its requests are right.
@@ -138,7 +138,7 @@ def changed_lines(
         looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
         others = [program for program in programs if program.source not in looked_up]
         best = best or _of_programs(others, report, compared, tolerance, is_known=True)
-        # Answers that are right to all requests of the dictionary are wrong in special cases.
+        # With right answers to all requests of the dictionary, answers are wrong in special cases.
         first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
         programs = [p for p in programs if p.source in first and not proposals.is_wrong]
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
@@ -165,7 +165,7 @@ def _tells(program: Program, compared: Sequence[Exchange]) -> bool:
 def _compared(
     report: TaskReport, greeting: Greeting, doubtful: Sequence[CaseJudgement]
 ) -> tuple[list[Exchange], float]:
-    """Return the answers that programs have to give, and the relative difference of equal ones."""
+    """Return the answers for programs to give, and the relative difference of equal answers."""
     compared = compared_answers(report, doubtful)
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
@@ -181,9 +181,9 @@ def _of_programs(
     tolerance: float,
     is_known: bool,
 ) -> tuple[Explanation, ...]:
-    """Return the fault or changed line of some programs that gives most answers.
+    """Return the fault or changed line of some programs with most answers.
 
-    Of many right steps those are tried that come nearest, all known faults first.
+    The nearest of many right steps are tried, all known faults first.
     """
     best, functions = tuple[Explanation, ...](), set[str]()
     if report.task in tool_steps.SOLVES:
@@ -227,7 +227,7 @@ def _trials(
 def _nearest(
     programs: Sequence[Program], report: TaskReport, compared: Sequence[Exchange]
 ) -> list[Program]:
-    """Return programs, those first that give most answers, then those that come nearest."""
+    """Return programs in the order of equal answers, then of distance."""
 
     def score(program: Program) -> tuple[int, float]:
         gaps = []

@@ -20,7 +20,7 @@ def changes_in_words(
 ) -> Sentence:
     """Return the sentence of the likeliest changes, in up to two functions, of equal answers.
 
-    They are the likeliest of `count` changes.
+    These lines are the likeliest of `count` changes.
     """
     ordered = sorted(
         (mutants[key] for key in keys),
@@ -57,7 +57,7 @@ def changes_in_words(
 
 
 def excerpts(right: str, wrong: str) -> tuple[str, str]:
-    """Return two lines, of long lines only the difference and some letters around it.
+    """Return two lines, of long lines only the difference and some letters around.
 
     `x = x` reads an input: its value alone is returned, and the value in its place.
     """

@@ -1,7 +1,8 @@
 """Answers about robots as equations J dq = e of a tool's step, whatever their damping and length.
 
-Solvers of the same equations give different coordinates: they damp and shorten steps as they like.
-A single iteration of any solver shows its J and e nevertheless, and where it ends, its e is zero.
+Solvers of the same equations give different coordinates: each solver damps and shortens steps in a
+way of its own. A single iteration of any solver shows its J and e nevertheless, and at the end of a
+solve e is zero.
 """
 
 from collections.abc import Iterator, Mapping
@@ -25,7 +26,7 @@ from .mutants import Program
 SOLVES, MOTIONS = (INVERSE, TRACK), TRACK
 # The task of the right programs of J and e, which no solver is asked.
 TASK = "tool_step"
-# Directions of steps agree to this: dampings between those that are tried leave less.
+# Directions of steps agree to this: dampings between the tried dampings leave less.
 SAME_STEP = 3e-3
 # Fewer joints than this reach no pose in other kinematics, and any damping fits their steps.
 MIN_JOINTS = 6
@@ -34,14 +35,15 @@ FUNCTIONS = {"kinematics", "jacobian", "error_of"}
 MAX_MOTIONS = 6
 # Steps shorter than this are rounding [rad, m], and joints as near to a limit are at the limit.
 SHORTEST = 1e-6
-# A solver has reached what is within so many tolerances: it may have a test of its own.
+# A solver has reached targets within so many tolerances, by a test of its own.
 LENIENT = 10.0
 # How far from its answer a solver is not at its target [rad, m].
 ELSEWHERE = 0.3
-# Squared dampings [m^2], and the ratios by which the best one is refined twice.
+# Squared dampings [m^2], and the ratios by which the best damping is refined twice.
 DAMPINGS = np.geomspace(1e-9, 1e4, 53)
 REFINEMENTS = (np.geomspace(0.57, 1.77, 25), np.geomspace(0.95, 1.05, 25))
-# No further program is changed after so many changes, by task: those of steps take a millisecond.
+# No further program is changed after so many changes, by task: programs of steps take a
+# millisecond.
 MAX_MUTANTS = {TASK: 3_000, "robot_jacobian": 14_000, "robot_velocity": 14_000}
 # Fewer answers would be met by many changes by chance.
 MIN_VIEW = 3
@@ -62,7 +64,7 @@ def views(report: TaskReport) -> Iterator[TaskReport]:
 
 
 def _poses(judgement: CaseJudgement) -> Iterator[CaseJudgement]:
-    """Yield the answer to a single target, or some frames of a motion as such answers."""
+    """Yield the answer to a single target, or some frames of a motion as single answers."""
     case, answer = judgement.case, judgement.answer
     if not isinstance(answer, Answer) or not np.isfinite(answer.values.get("q", np.nan)).all():
         return
@@ -82,7 +84,7 @@ def _poses(judgement: CaseJudgement) -> Iterator[CaseJudgement]:
 
 
 def _is_step(pose: CaseJudgement) -> bool:
-    """Return whether an answer is a single iteration that meets no limit."""
+    """Return whether an answer is a single iteration away from limits."""
     assert isinstance(pose.answer, Answer)
     inputs, q = pose.case.inputs, pose.answer.values["q"]
     is_free = (q < inputs["upper"] - SHORTEST) & (q > inputs["lower"] + SHORTEST)
@@ -111,7 +113,7 @@ def _as_step(pose: CaseJudgement) -> CaseJudgement:
 
 
 def _as_end(pose: CaseJudgement) -> CaseJudgement:
-    """Return an answer as coordinates at which a solver is on its target, and off it elsewhere."""
+    """Return an answer as coordinates on a solver's target, off target elsewhere."""
     assert isinstance(pose.answer, Answer)
     inputs = {**pose.case.inputs, "q": pose.answer.values["q"]}
     case = replace(pose.case, task=TASK, inputs=inputs, facts={})
@@ -121,8 +123,8 @@ def _as_end(pose: CaseJudgement) -> CaseJudgement:
 def answer_of(program: Program, case: Case) -> Mapping[str, Any]:
     """Return what the equations of a program make of an answer; raise ArithmeticError if nothing.
 
-    These are the step along its equations that is nearest to the answer's, or whether it is on its
-    target at the answer, and off it in both parts elsewhere.
+    These are the nearest step by its equations, or whether the program is on its target at the
+    answer, and off target in both parts elsewhere.
     """
     inputs = dict(case.inputs)
     q = inputs.pop("q")
