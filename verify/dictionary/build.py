@@ -21,12 +21,12 @@ from .requests import FK, LARGEST, OUTPUTS, fractions, is_solve, keys, requests
 
 # Differences of keys above this tell answers apart, the shortest distance of a look-up.
 DISTINCT = 1e-6
-# A change whose keys move by more than the second number when inputs move by the first, relative,
-# is left out: rounding would decide what it answers.
+# A change is left out if its keys move by more than the second number when inputs move by the
+# first, relative. Rounding would decide its answers.
 NUDGE, MOVED = 1e-14, 1e-9
-# The most entries with equal keys that are kept, the likeliest ones.
+# The largest number of entries with equal keys, the likeliest entries.
 EQUAL = 3
-# The functions whose changes are tried in each program: they do other things to other forms.
+# The functions whose changes are tried in each program, with other effects on other forms.
 IN_FORMS = {"conjugate", "cross", "product", "product_of_vectors", "by_cross", "by_product"}
 
 
@@ -69,7 +69,7 @@ def build(task: str, method: str, notify: Callable[[str], None] = lambda text: N
 def _add(
     equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray, program: Program
 ) -> None:
-    """Add a change of a program to those that answer alike, the likeliest of which remain."""
+    """Add a change of a program to changes with equal answers; the likeliest remain."""
     count = (equal[0][0].equal_count if equal else 0) + (len(entry.codes) < 2)
     is_likely = len(equal) < EQUAL or likelihood(entry) < likelihood(equal[-1][0])
     if is_likely and all(entry[:6] != other[:6] for other, _ in equal):
@@ -86,7 +86,7 @@ Run = Callable[[Case], Mapping[str, Any]]
 def _changes(
     name: str, program: Program, cases: Sequence[Case], method: str, functions: set[str]
 ) -> Iterator[tuple[Entry, Run]]:
-    """Yield the changes of a program with their answers: while it has them, and no longer."""
+    """Yield the changes of a program with their answers, each while in place."""
     passes, answer = {}, partial(answer_of, program, method)
     for case in cases:
         _, passes[case.name] = program.count_passes(partial(answer, case))
@@ -113,7 +113,7 @@ def _changes(
 
 
 def _codes(name: str, task: str, method: str) -> Iterator[tuple[str, ...]]:
-    """Yield the known faults of a program; of the first one also two at once."""
+    """Yield the known faults of a program; of the first program also two at once."""
     codes = [fault.code for fault in faults_in(source_of(name), task, method)]
     yield from ((code,) for code in codes)
     if name == IN_DICTIONARY[method or task][0]:

@@ -1,4 +1,4 @@
-"""The known faults of a solver that makes a constant number of sweeps, whatever is asked."""
+"""The known faults of a solver with a constant number of sweeps for any request."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
@@ -14,18 +14,18 @@ from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
 from .entry import Dictionary, Entry, likelihood
 
-# The most sweeps that are tried: most constants are smaller, or enough for poses to stay.
+# The largest number of tried sweeps: most constants are smaller, or enough for poses to stay.
 MAX_SWEEPS = 30
-# The passes through loops that a sweep of a small skeleton needs, and more.
+# More passes through loops than a sweep of a small skeleton needs.
 PASSES = 100
-# Poses that a further sweep changes by less stay.
+# Poses with a smaller change by a further sweep stay.
 STAYING = 1e-12
 # Answers of equal sweeps differ by less, in single precision too.
 SAME = 1e-6
 
 
 def makes_constant_sweeps(cases: Sequence[Case], answers: Sequence[Answer | Failure]) -> bool:
-    """Return whether the first request has the answer of one with more sweeps of the same start."""
+    """Return whether the first request has the answer of a request for more sweeps."""
     case, answer = cases[0], answers[0]
     return any(
         np.array_equal(other.inputs["target"], case.inputs["target"])
@@ -41,7 +41,7 @@ def known_fault(
     base: Program, dictionaries: Iterable[Dictionary], method: str, case: Case, answer: Answer,
     tolerance: float,
 ) -> tuple[list[Entry], int | None]:  # fmt: skip
-    """Return the known fault that answers a request so after some sweeps, and that number.
+    """Return the known fault with a request's answer after some sweeps, and their number.
 
     There is none if the right program does.
     """
@@ -65,7 +65,7 @@ def known(dictionaries: Iterable[Dictionary]) -> list[Entry]:
 
 
 def _sweeps(program: Program, method: str, exchange: Exchange, tolerance: float) -> int | None:
-    """Return after how many sweeps a program has an answer, None if after none of those tried."""
+    """Return after how many sweeps a program has an answer, or None."""
     case = exchange.case
     assert isinstance(exchange.answer, Answer)
     for count in range(1, MAX_SWEEPS + 1):

@@ -31,9 +31,9 @@ class Entry(NamedTuple):
     equal_count: int = 1  # of the changed lines that answer alike
 
     def changed_program(self) -> Program:
-        """Return the program with the change; raise ValueError or SyntaxError if it has no place.
+        """Return the program with the change; raise ValueError or SyntaxError without a place.
 
-        The function has the passes of `Program` in its loops: it was written by one.
+        The function has the passes of `Program` in its loops, from which it was written.
         """
         source, faults = source_of(self.program), coded_faults()
         for code in self.codes:
@@ -46,7 +46,7 @@ class Entry(NamedTuple):
         return program
 
     def texts(self) -> dict[str, str]:
-        """Return the functions that the change has made, by their names."""
+        """Return the changed functions by their names."""
         if self.text:
             return {self.function: self.text}
         right = Program(source_of(self.program)).texts
@@ -60,7 +60,7 @@ class ChangePair(NamedTuple):
     second: Entry
 
     def changed_program(self) -> Program:
-        """Return the program with both changes; raise ValueError if they share a line."""
+        """Return the program with both changes; raise ValueError of a shared line."""
         program = Program(source_of(self.first.program))
         right, texts = program.texts, self.first.texts()
         for name, text in self.second.texts().items():
@@ -71,7 +71,7 @@ class ChangePair(NamedTuple):
 
 
 def merged(right: str, first: str, second: str) -> str:
-    """Return a text with the lines that two others change; raise ValueError if they share one."""
+    """Return a text with the changed lines of two texts; raise ValueError of a shared line."""
     lines, changes = right.splitlines(), list[tuple[int, int, list[str]]]()
     for text in (first, second):
         new = text.splitlines()
@@ -110,7 +110,7 @@ class Dictionary(NamedTuple):
 
 
 def _planes(keys: Any) -> bytes:
-    """Return the bytes of numbers, all first bytes, then all second ones: they compress better."""
+    """Return the bytes of numbers, all first bytes before all second bytes, to compress well."""
     return np.ascontiguousarray(keys.reshape(-1, 1).view("u1").T).tobytes()
 
 

@@ -1,4 +1,4 @@
-"""Look up the changes of right programs that answer a few requests as a solver does."""
+"""Look up the changes of right programs with a solver's answers to a few requests."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -19,10 +19,10 @@ from .constant_sweeps import known_fault, makes_constant_sweeps
 from .entry import Dictionary, Entry, file_of, likelihood, read
 from .requests import FK, IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
 
-# Keys differ by ten times the rounding of an answer: single precision loses three digits more, and
-# a fourth where a mistake enlarges rounding, which is tried where nothing is nearer.
+# Keys differ by ten times the rounding of an answer. Single precision loses three digits more, and
+# a fourth where a mistake enlarges rounding; the fourth is tried where nothing is nearer.
 TOLERANCES = {"double": (1e-6,), "single": (1e-4, 1e-3)}
-# Equal requests get answers that differ by less, but for threads that add up in another order.
+# Answers to equal requests differ by less, except by threads with another order of sums.
 SAME = 1e-6
 # The most candidates, which all cases have to decide between.
 MAX_CANDIDATES = 200
@@ -42,7 +42,7 @@ class Proposals(NamedTuple):
 
 
 def look_up(connection: Connection, task: str, method: str, greeting: Greeting) -> Proposals | None:
-    """Return the changes that a new process of a solver answers like, None without a dictionary.
+    """Return the changes with the answers of a new process of a solver, None without a dictionary.
 
     Each request is looked up alone as well: a second mistake may hide the first in another.
     """
@@ -79,7 +79,7 @@ def look_up(connection: Connection, task: str, method: str, greeting: Greeting) 
 
 
 def _dictionary(task: str, method: str) -> Dictionary:
-    """Return the dictionary of a task and a method; raise ValueError if it is of other requests."""
+    """Return the dictionary of a task and a method; raise ValueError of other requests."""
     dictionary, count = read(file_of(task, method)), len(requests(task, method))
     if dictionary.keys.shape[1] != count:
         raise ValueError(f"expected keys of {count} requests, got {dictionary.keys.shape[1]}")
@@ -97,7 +97,7 @@ def _table(
     cases: Sequence[Case],
     answers: Sequence[Answer | Failure],
 ) -> Table:
-    """Return the keys of a solver's answers, NaN of requests that are not sent."""
+    """Return the keys of a solver's answers, NaN of unsent requests."""
     base, all_cases = Program(source_of(IN_DICTIONARY[method or task][0])), requests(task, method)
     names = [case.name for case in all_cases]
     rows = np.full((len(names), len(OUTPUTS[task])), np.nan)
@@ -107,7 +107,7 @@ def _table(
 
 
 def _candidates(tables: Sequence[Table], tolerance: float) -> list[Entry]:
-    """Return the likeliest of the entries that match rows of keys."""
+    """Return the likeliest entries with the keys of rows."""
     ranks = [pair for table in tables for pair in _matches(*table, tolerance)]
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
     return [entry for _, entry in ranks[:MAX_CANDIDATES]]
@@ -140,9 +140,9 @@ def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -
 def _matches(
     dictionary: Dictionary, rows: FloatArray, is_solve: Sequence[bool], tolerance: float
 ) -> list[tuple[int, Entry]]:
-    """Return the entries with the keys of all answered requests, or (1) of a single wrong one.
+    """Return the entries with the keys of all answered requests, or (1) of a single wrong answer.
 
-    The rows have the keys of all outputs or of the first ones. An entry with wrong single sweeps
+    The rows have the keys of all outputs or of the first outputs. An entry with wrong single sweeps
     has no keys of solves.
     """
     keys = dictionary.keys[:, :, : rows.shape[1]]

@@ -24,29 +24,29 @@ FORCES, ENERGY = "mass_spring_forces", "energy"
 # The tasks and methods with a dictionary.
 TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"), (FORCES, ""), (ENERGY, ""))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
-# Parents, effector and target of each: a tree with an inner effector, a chain, one in a plane.
+# Parents, effector and target of each: a tree with an inner effector, a chain, a chain in a plane.
 TREE = ([-1, 0, 1, 1, 3, 4], 4, (1.4, -1.0, -1.4))
 CHAIN = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6))
 IN_PLANE = ([-1, 0, 1, 2], 3, (-0.6, -0.2, 0.0))
 # For solvers of positions alone: without rotations, in a plane as well.
 AT_REST = ([-1, 0, 1, 2], 3, (-0.5, -0.4, 0.0))
-# With tolerance and number of sweeps: single sweeps, then solves that end by either of them. CCD
-# needs 12 sweeps to the tolerance, FABRIK 10: most round distances end them elsewhere.
+# With tolerance and number of sweeps: single sweeps, then solves with an end by either limit. CCD
+# needs 12 sweeps to the tolerance, FABRIK 10: most round distances end solves elsewhere.
 PROBLEMS = (
     (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*TREE, 0.0, 3),
     (*CHAIN[:2], (-1.1, -0.6, 0.3), 4e-3, 16), (*AT_REST, 0.0, 1),
 )  # fmt: skip
 # A triangle with a tail; every spring has numbers of its own.
 SPRINGS = np.array([[0, 1], [2, 0], [1, 2], [2, 3]])
-# What is zero in each request of a mass-spring system: the first three show springs, gravity and
-# motion alone, so that a mistake in one hides none in another; the last shows all of them.
+# The zeros in each request of a mass-spring system. The first three show springs, gravity and
+# motion alone, so a mistake in springs hides no mistake in gravity; the last shows all three.
 ZEROS = (
     ("dampings", "gravity", "velocities"),
     ("stiffnesses", "dampings", "velocities"),
     ("stiffnesses", "gravity"),
     (),
 )
-# The outputs that have keys, in their order: what poses have, and what the path has alone.
+# The outputs with keys, in their order: outputs of poses, and outputs of the path alone.
 OUTPUTS = {
     FK: ("positions", "rotations"),
     IK: ("local_rotations", "path"),
@@ -60,7 +60,7 @@ SMALLEST = 1e-12
 
 
 def requests(task: str, method: str) -> list[Case]:
-    """Return the requests of a task and a method: of poses those alone that differ in the start."""
+    """Return the requests of a task and a method, of poses with different starts alone."""
     if task in (FORCES, ENERGY):
         return [_spring_request(task, number) for number in range(len(ZEROS))]
     cases = []
@@ -134,7 +134,7 @@ def suitable(case: Case, greeting: Greeting) -> bool:
 def keys(values: Mapping[str, Any], right: Mapping[str, Any], case: Case) -> FloatArray:
     """Return the key of each output of an answer, NaN where the output is missing.
 
-    A key is the difference from the right answer over its size, projected on one direction.
+    A key is the difference from the right answer over its size, projected on a direction.
     """
     names = OUTPUTS[case.task]
     sizes = [
