@@ -1,4 +1,4 @@
-"""Equalities that all answers have and right answers have not."""
+"""Equalities of all answers, but not of right answers."""
 
 from collections.abc import Set
 from typing import Any
@@ -9,8 +9,8 @@ from plumbob.text.sentence import sentence
 
 from .separation import MIN_CASES, TOLERANCE, Statement, words_of
 
-# Right answers differ from an equality if their gap is larger: far more than rounding, so that no
-# equality is reported that right answers nearly have.
+# Right answers differ from an equality if their gap is larger: far more than rounding, so near
+# equalities of right answers are not reported.
 DIFFERENT = 1e-3
 
 
@@ -19,23 +19,24 @@ class Equalities:
 
     def __init__(self, sound: Set[str] = frozenset()) -> None:
         self._sound = sound  # cases with a right verdict
-        # by the equality and the case: whether the answer has it, and whether a right one differs
+        # by the equality and the case: whether the answer has the equality, and whether a right
+        # answer differs
         self._cases: dict[str, dict[str, tuple[bool, bool]]] = {}
 
     def add(self, equality: str, case: str, gaps: Any, right_gaps: Any) -> None:
-        """Add the gaps of a case, of one element or several."""
+        """Add the gaps of a case, of an element or several."""
         if np.size(gaps):
             holds = bool((np.asarray(gaps) <= TOLERANCE).all())
             differs = bool((np.asarray(right_gaps) > DIFFERENT).any()) and case not in self._sound
             self._cases.setdefault(equality, {})[case] = holds, differs
 
     def strongest(self) -> list[Statement]:
-        """Return the equality that most right answers do not have, if there is any."""
+        """Return the equality that fewest right answers have, if any."""
         statements = filter(None, map(self.statement, self._cases))
         return sorted(statements, key=lambda statement: statement.score)[:1]
 
     def statement(self, name: str) -> Statement | None:
-        """Return an equality of all answers that enough right answers do not have, else None."""
+        """Return an equality of all answers without enough right answers, else None."""
         cases = self._cases.get(name, {})
         count, different = len(cases), sum(differs for _, differs in cases.values())
         if different < MIN_CASES or not all(holds for holds, _ in cases.values()):

@@ -1,4 +1,4 @@
-"""The fewest terms whose sum, with one coefficient each, is a quantity in all cases."""
+"""The fewest terms whose sum, with a coefficient each, is a quantity in all cases."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from fractions import Fraction
@@ -11,7 +11,7 @@ from plumbob.reference.arguments import FloatArray
 
 # Residuals of a sum relative to the quantity: above rounding in single precision.
 TOLERANCE = 1e-5
-# A term that contributes less to every number is not a part of a sum.
+# A term with a smaller contribution to every number is not a part of a sum.
 MIN_SHARE = 1e-3
 # Each term of a sum needs so many numbers, and two more: fewer are met by chance.
 NUMBERS_FOR_EACH = 4
@@ -19,7 +19,7 @@ NUMBERS_FOR_EACH = 4
 INDEPENDENT = 1e-7
 # A coefficient is a fraction of numbers up to this if the two differ by less than NEAR.
 DENOMINATOR, NEAR = 12, 1e-6
-# Coefficients this near to the right ones are right: single precision leaves 0.99998.
+# Coefficients this near to right coefficients are right: single precision leaves 0.99998.
 RIGHT = 1e-4
 
 
@@ -50,7 +50,7 @@ def fit(quantity: FloatArray, terms: Mapping[str, FloatArray], max_terms: int) -
 def _sums(
     quantity: FloatArray, columns: Mapping[str, FloatArray], count: int
 ) -> Iterator[list[Term]]:
-    """Yield the sums that are a quantity, of so many columns, all needed and independent."""
+    """Yield the sums equal to a quantity, of so many columns, all needed and independent."""
     scale = np.abs(quantity).max()
     y = quantity / scale
     names, sizes = list(columns), np.array([np.abs(column).max() for column in columns.values()])
@@ -78,7 +78,7 @@ def _plainness(terms: Sequence[Term]) -> float:
 
 
 def is_sum(terms: Sequence[Term], due: Mapping[str, float]) -> bool:
-    """Return whether terms are the right ones, with right coefficients."""
+    """Return whether terms and coefficients are right."""
     return {term.symbol for term in terms} == due.keys() and all(
         abs(term.coefficient - due[term.symbol]) <= RIGHT for term in terms
     )

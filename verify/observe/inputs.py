@@ -22,16 +22,16 @@ from .separation import MIN_CASES, Statement
 
 # The requests in which each input is changed alone.
 REQUESTS = 3
-# Answers that differ by less than this share are the same; right answers that differ by less than
-# DIFFERENT do not tell whether an input is read.
+# Answers within this share of each other are the same. Right answers within DIFFERENT of each other
+# do not tell whether an input is read.
 SAME, DIFFERENT = 1e-10, 1e-4
-# Inputs that state which joints and springs there are: other numbers are another problem.
+# Inputs for the number of joints and springs: other numbers are another problem.
 STRUCTURE = ("parents", "springs", "pinned", "method", "effector", "steps", "tension_only")
-# What a greeting says of a step that need not read the dampings.
+# The declarations of steps without a need of dampings.
 DAMPERS = (None, "none", "global_factor")
-# A solve that a tolerance of LOOSE [m] ends early, and that goes on with other sweeps.
+# A solve with an early end by a tolerance of LOOSE [m], and with further sweeps otherwise.
 TIGHT, LOOSE, SWEEPS, FEW_SWEEPS = 1e-6, 0.3, 60, 2
-# The inputs of robots that change all right answers, and the requests and frames that show them.
+# The inputs of robots with an effect on all right answers, and the requests and frames for a proof.
 ROBOT_INPUTS = {
     "robot_jacobian": ("origins", "orientations", "axes", "tool_position", "q"),
     "robot_velocity": ("origins", "orientations", "axes", "tool_position", "q",
@@ -43,21 +43,21 @@ ROBOT_INPUTS = {
 }  # fmt: skip
 ROBOT_FAMILIES, FRAMES = ("any configuration", "any pose", "near start", "curve"), 3
 DIRECTIONS = ("rotation", "rotations", "orientations", "axes")
-# What a program may say of a solve by an input that does not change the pose.
+# Outputs about a solve by inputs without an effect on the pose.
 CLAIMS = {"residual", "iterations", "converged"}
 
 
 def unread_inputs(
     connection: Connection, cases: Sequence[Case], greeting: Greeting, method: str
 ) -> list[str]:
-    """Return the inputs that change no answer to enough requests, where right answers change."""
+    """Return the inputs without an effect on answers, where enough right answers change."""
     counts: dict[str, list[bool]] = {}
     for case in _telling(cases):
         before = connection.answer(case)
         if not isinstance(before, Answer):
             continue
         for name, changed in _changes(case, greeting):
-            # a solve that never arrives does not show its tolerance
+            # a solve without arrival does not show its tolerance
             is_hidden = name == "tolerance" and not _arrives(case, before)
             if is_hidden or not _matters(case, changed, method):
                 continue
@@ -70,7 +70,7 @@ def unread_inputs(
 
 
 def statement_of(names: Sequence[str]) -> Statement:
-    """Return the words about inputs that are not read."""
+    """Return the words about unread inputs."""
     words = sentence(
         "The answers do not depend on {inputs}, on which right answers do: each was changed alone "
         "in {count} requests.",
@@ -98,14 +98,14 @@ def _telling(cases: Sequence[Case]) -> list[Case]:
 
 
 def _shortened(case: Case) -> Case:
-    """Return a motion's first frames, or another request as it is."""
+    """Return a motion's first frames, or another request unchanged."""
     frames = {name: value[:FRAMES] for name, value in case.inputs.items()
               if name.startswith("target") and case.task == "robot_track"}  # fmt: skip
     return replace(case, inputs={**case.inputs, **frames})
 
 
 def _changes(case: Case, greeting: Greeting) -> Iterator[tuple[str, dict[str, Any]]]:
-    """Yield an input that is not a constant of the solver, and the inputs with another value."""
+    """Yield an input beside the solver's constants, and the inputs with another value."""
     rng = np.random.default_rng(3)
     for name, value in case.inputs.items():
         if case.task in ROBOT_INPUTS and name not in ROBOT_INPUTS[case.task]:
@@ -156,7 +156,7 @@ def right_answer(case: Case, method: str) -> Mapping[str, Any]:
 
 
 def _arrives(case: Case, answer: Answer) -> bool:
-    """Return whether a pose is so near to its target that a loose tolerance would end the solve."""
+    """Return whether a loose tolerance would end a solve at the pose, near its target."""
     pose = read_pose(answer.values, case.inputs, case.facts)
     return pose.distance <= LOOSE
 

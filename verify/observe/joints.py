@@ -1,8 +1,8 @@
 """What answers of kinematics show: each joint is judged given the rest of the answer.
 
-A joint's pose is held against the answered pose of its parent, a rotation of CCD against the
-answers for the joints below, a point of FABRIK against the point before. Otherwise an error at one
-joint would spread to all joints below, and its place would not show.
+A joint's pose is compared with the answered pose of its parent, and a point of FABRIK with the
+point before. A rotation of CCD is compared with the answers for the joints below. Otherwise an
+error at one joint would spread to all joints below, and hide its place.
 """
 
 from collections.abc import Mapping, Sequence, Set
@@ -69,7 +69,7 @@ def angles(p: FloatArray, q: FloatArray) -> FloatArray:
 
 
 def _unit(q: FloatArray) -> FloatArray:
-    """Return unit quaternions, NaN in place of invalid ones."""
+    """Return unit quaternions, NaN in place of invalid quaternions."""
     squares = (q * q).sum(axis=-1, keepdims=True)
     return q / np.sqrt(np.where(squares > 1e-24, squares, np.nan))
 
@@ -94,8 +94,8 @@ def _size(offsets: FloatArray) -> float:
 def forward_evidence(judgements: Sequence[CaseJudgement]) -> Findings:
     """Return what answers of forward kinematics show.
 
-    A joint without rotation, and a link without length, count for neither side: they are right
-    whatever a solver does.
+    A joint without rotation, and a link without length, count for neither side: both are right for
+    any solver.
     """
     sound = sound_cases(judgements)
     tables = {name: ElementTable(name, sound) for name in ("rotation", "position")}
@@ -137,13 +137,13 @@ class ForwardPose:
 
     @property
     def wrong(self) -> BoolArray:
-        """Which joints do not have the pose that follows from the answer for their parent."""
+        """Joints without the pose by the answer for their parent."""
         if self.positions is None or self.raw is None:
             return np.zeros(len(self.parents), dtype=bool)
         return ~(np.maximum(self.gaps, self.turns) <= BETWEEN * TOLERANCE)
 
     def carriers(self, joint: int) -> IndexArray:
-        """Return the joints from whose answered pose that of a joint follows."""
+        """Return the joints whose answered poses give the pose of a joint."""
         R = self.rotations
         gaps = self.positions + rotation.rotate(R, self.offsets[joint]) - self.positions[joint]
         turns = angles(self.raw[joint], rotation.multiply(R, self.local[joint]))
@@ -181,7 +181,7 @@ def _add_products(pose: ForwardPose, raw: FloatArray, equalities: Equalities) ->
 
 
 def _add_frames(pose: ForwardPose, links: FloatArray, equalities: Equalities) -> None:
-    """Add other frames in which a joint's offset may stand; rotations are the right ones."""
+    """Add other frames in which a joint's offset may stand; rotations are right."""
     R, parents, offsets = pose.right, pose.parents, pose.offsets
     right = rotation.rotate(_of_parents(R, parents, IDENTITY), offsets)
     frames = {
@@ -199,7 +199,7 @@ def _add_frames(pose: ForwardPose, links: FloatArray, equalities: Equalities) ->
 
 
 def _other_parents(poses: Sequence[ForwardPose]) -> list[Statement]:
-    """Return that each wrong joint hangs from another joint than its parent, [] if not so."""
+    """Return the sentence on wrong joints at another joint than their parent, or []."""
     hanging = [
         (pose, j, pose.carriers(j)) for pose in poses for j in map(int, np.flatnonzero(pose.wrong))
     ]
@@ -222,9 +222,9 @@ def _other_parents(poses: Sequence[ForwardPose]) -> list[Statement]:
 def inverse_evidence(
     report: TaskReport, judgements: Sequence[CaseJudgement], unread: Set[str] = frozenset()
 ) -> Findings:
-    """Return what poses of inverse kinematics show; right sweeps are those of the method.
+    """Return what poses of inverse kinematics show; right sweeps are the method's.
 
-    If `max_iterations` is unread, no answer is that of one sweep.
+    If `max_iterations` is unread, no answer belongs to a single sweep.
     """
     method, reads_sweeps = _method(report), "max_iterations" not in unread
     sound = sound_cases(judgements)
@@ -261,7 +261,7 @@ def _method(report: TaskReport) -> str:
 
 
 class SolvedPose:
-    """An answered pose, the start, and the right pose where a method has one.
+    """An answered pose, the start, and the right pose, if unique.
 
     Each method adds what the answer shows to tables and equalities.
     """
@@ -332,7 +332,7 @@ class SolvedPose:
         }
 
     def _add_links(self, x: FloatArray) -> None:
-        """Add the lengths of answered links, and whether they are those of the rotations."""
+        """Add the lengths of answered links, and whether positions agree with rotations."""
         features, above = _at(self.features, slice(1, None)), self.parents[1:]
         y, links = self.answer.positions, x[1:] - x[above]
         lengths, due = (np.linalg.norm(v, axis=1) for v in (links, self.offsets[1:]))
@@ -342,7 +342,7 @@ class SolvedPose:
             self.tables["agreement"].add(self.name, gaps, features)
 
     def _add_rotations(self, local: FloatArray) -> None:
-        """Add equalities with the request of joints that have a role, and joints off the path."""
+        """Add equalities with the request of joints of a role, and of joints off the path."""
         changes, path = angles(local, self.start), self.path
         is_off = ~np.isin(np.arange(len(self.parents)), path)
         self.tables["unmoved"].add(self.name, changes, self.features, is_counted=is_off)

@@ -1,6 +1,7 @@
 """What springs pull in a linearised step, along and across them.
 
-A step of two free particles tells it: in the difference of their accelerations gravity cancels.
+A step of two free particles tells the pull: in the difference of their accelerations gravity
+cancels.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,17 +16,18 @@ from .fits import Term, fit, formula, is_sum
 from .pulls import SpringCase
 from .separation import TOLERANCE
 
-# What a spring may pull along itself, by its stiffness k, length l, rest length r, and e, what the
-# step adds to its length, to first order; and across itself, for each unit that it is moved across.
+# Possible pulls of a spring along itself, by its stiffness k, length l, rest length r, and its
+# lengthening e by the step, to first order. Then pulls across itself, for each unit of motion
+# across.
 ALONG = ("k l", "k r", "k e", "k r e/l", "k l²", "k r²", "k l³/r²", "k l² e/r²", "k")
 ACROSS = ("k", "k r/l", "k l/r", "k l²/r²", "k r²/l²")
 RIGHT_ALONG = {"k l": 1.0, "k r": -1.0, "k e": 1.0}
-# The whole Hessian, and those without its geometric term, or with k in all directions.
+# The whole Hessian, the Hessian without its geometric term, or with k in all directions.
 RIGHT_ACROSS: Sequence[Mapping[str, float]] = ({"k": 1.0, "k r/l": -1.0}, {}, {"k": 1.0})
 
 
 class LinearPull(NamedTuple):
-    """What the spring of a pair pulls in a step, and the terms that it may be a sum of."""
+    """What the spring of a pair pulls in a step, and the possible terms of the pull."""
 
     along: float  # [N]
     across: float  # [N/m]
@@ -34,9 +36,9 @@ class LinearPull(NamedTuple):
 
 
 def linearised_pulls(cases: Sequence[SpringCase]) -> tuple[Sentence, bool] | None:
-    """Return what springs pull in a linearised step, and whether it is right.
+    """Return the pull of springs in a linearised step, and whether the pull is right.
 
-    It is None if answers are of no such step.
+    None stands for answers of another step.
     """
     pairs = [case for case in cases if _is_pair(case)]
     pulls = [pull for pull in map(_pull, pairs) if pull is not None]
@@ -79,7 +81,7 @@ def _is_pair(case: SpringCase) -> bool:
 
 
 def _pull(case: SpringCase) -> LinearPull | None:
-    """Return what the spring of a pair pulls, None if it pulls beside what its ends move."""
+    """Return what the spring of a pair pulls, None for a pull beside the motion of its ends."""
     p, incidence = case.problem, case.problem.incidence[0]
     assert case.end is not None
     d = incidence @ case.x

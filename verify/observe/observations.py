@@ -1,7 +1,7 @@
 """What the answers of a wrong solver show, in a few sentences.
 
-They come before the mistakes that a catalogue has, are true of all the answers that they count, and
-need no knowledge of mistakes. The verdict never depends on them.
+Observations come before the mistakes of a catalogue, are true of all counted answers, and need no
+knowledge of mistakes. The verdict never depends on observations.
 """
 
 from collections.abc import Sequence
@@ -28,18 +28,18 @@ STEP = "mass_spring_step"
 OF_SPRINGS = (forces.TASK, energy.TASK, STEP)
 TASKS = (forward_kinematics.TASK, problems.TASK, *OF_SPRINGS, *robots.TASKS)
 # Fewer cases let chance speak: of 5 random cases 27 % of the statements were false on all cases.
-# Requests about springs that are not counted, 20 or more, may make up for cases without an answer.
+# Uncounted requests about springs, 20 or more, may make up for cases without an answer.
 MIN_ANSWERS = 14
 # Failures after which no more is asked.
 ENDS = (FailureKind.CRASHED, FailureKind.HUNG, FailureKind.MEMORY)
-# The most sentences before the one about what is right, and the most quantities in that.
+# The largest numbers of sentences before the sentence on right quantities, and of quantities there.
 SENTENCES, RIGHT = 3, 4
 
 
 def observe(connection: Connection, report: TaskReport, seed: int) -> tuple[Sentence, ...]:
-    """Return what the answers to a task show, () if they are not wrong or too few.
+    """Return what the answers to a task show, () for right or too few answers.
 
-    The solver is asked about 20 requests more, and some again with one input changed.
+    The solver is asked about 20 requests more, and some again with a changed input.
     """
     answered = [j for j in report.judgements if _is_usable(j)]
     is_stuck = any(is_hung(judgement.answer) for judgement in report.judgements)
@@ -63,13 +63,13 @@ def observe(connection: Connection, report: TaskReport, seed: int) -> tuple[Sent
 
 
 def _is_usable(judgement: CaseJudgement) -> bool:
-    """Return whether a case has an answer, and one right answer alone."""
+    """Return whether a case has an answer, and a unique right answer."""
     is_must = judgement.case.requirement == "must" and "cones" not in judgement.case.inputs
     return is_must and isinstance(judgement.answer, Answer)
 
 
 def _telling_cases(report: TaskReport, greeting: Greeting, seed: int) -> list[Case]:
-    """Return requests that tell more than the cases and suit the solver, never counted."""
+    """Return suitable requests beyond the cases, never counted."""
     if report.task in (forward_kinematics.TASK, problems.TASK):
         module = forward_kinematics if report.task == forward_kinematics.TASK else problems
         return module.telling_cases(greeting, report.method, seed)
@@ -77,7 +77,7 @@ def _telling_cases(report: TaskReport, greeting: Greeting, seed: int) -> list[Ca
 
 
 def _ask(connection: Connection, cases: Sequence[Case], method: str) -> list[CaseJudgement]:
-    """Return the answers to requests, with the right ones of kinematics, and without findings.
+    """Return the answers to requests, with right answers of kinematics, and without findings.
 
     Requests without an answer are left out; after a crash or a hang no more are sent.
     """
@@ -99,7 +99,7 @@ def sentences(
     greeting: Greeting,
     unread: Sequence[str] = (),
 ) -> tuple[Sentence, ...]:
-    """Return what answers show, given the inputs that they do not depend on."""
+    """Return the observations on answers, given the unread inputs."""
     evidence = _evidence(report, judgements, greeting, unread)
     tables, equations = list(evidence.tables.values()), sorted(evidence.statements, key=_score)
     # the places say more than the statements before if they are exact
@@ -114,9 +114,9 @@ def sentences(
 
 
 def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
-    """Return exact separations, else one-sided ones, else quantities that are wrong everywhere.
+    """Return exact separations, else one-sided separations, else quantities wrong everywhere.
 
-    Without a separation come quantities that are wrong in part as well, wherever that is.
+    Without a separation come quantities with some wrong elements as well, wherever found.
     """
     exact, vague, everywhere = list[Statement](), list[Statement](), list[Statement]()
     for table in tables:

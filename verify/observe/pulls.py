@@ -1,7 +1,7 @@
 """What springs pull and what gravity does, solved from answers of mass-spring systems.
 
-Every answered force, or change of velocity or position, is the sum of what springs pull along their
-directions and of gravity; least squares give each pull.
+Every answered force, or change of velocity or position, is the sum of the springs' pulls along
+their directions and of gravity. Least squares give each pull.
 """
 
 from collections.abc import Iterator, Mapping
@@ -61,7 +61,7 @@ class SpringCase:
         self.forces, self.epsilon = outputs.get("forces"), epsilon
 
     def rounding(self) -> float:
-        """Return the error of such a force that rounding of the answers leaves [N]."""
+        """Return the error of a force by the rounding of the answers [N]."""
         if self.forces is not None:
             return ROUNDINGS * self.epsilon * float(np.abs(self.forces).max())
         size = float(np.abs(self.x).max() + self.h * np.abs(self.v).max())
@@ -92,7 +92,7 @@ class SpringCase:
 
 
 class ForceReading:
-    """A force that follows from an answer, with the acting springs at some positions.
+    """A force from an answer, with the acting springs at some positions.
 
     Attributes:
         name: a key of READINGS.
@@ -146,7 +146,7 @@ def readings_of(case: SpringCase) -> Iterator[ForceReading]:
         yield ForceReading("start, velocities", case, by_v, x, v)
         if end is not None:
             yield ForceReading("end, velocities", case, by_v, end, v)
-    # a damper is read in other directions than a spring in an iteration: leave such cases out
+    # a damper is read in other directions than a spring in an iteration: leave these cases out
     if end is not None and not case.problem.damped:
         p = case.problem
         stretched = by_x + p.incidence.T @ (p.stiffnesses[:, None] * (p.incidence @ end))
@@ -165,7 +165,7 @@ class Pulls(NamedTuple):
 
 
 def solve_pulls(case: SpringCase, reading: ForceReading) -> Pulls | None:
-    """Return pulls and gravity, None if an answer does not determine them or is no such sum."""
+    """Return pulls and gravity, None for an indeterminate answer or another sum."""
     p, acting, free = case.problem, case.acting, case.free
     count, incidence = int(acting.sum()), p.incidence[acting]
     is_measured = 3 * len(free) > count + 3

@@ -27,10 +27,10 @@ from .separation import ElementTable, Findings, Statement, separation
 TASKS = (robot_targets.TASK, TRACK, robot_jacobian.TASK, robot_velocity.TASK)
 # Fewer answers, frames or joints say nothing.
 MIN_COUNT = 6
-# Shares of answers that are nearly all, and of those that are few.
+# Shares of nearly all answers, and of few answers.
 NEARLY_ALL, FEW = 0.9, 0.5
-# A part of the tool's displacement is a factor times the error if the remainder is this share of
-# it: dampings of right solvers leave less. Factors this near to 1 are right.
+# A part of the tool's displacement is a factor times the error if the remainder is at most this
+# share. Dampings of right solvers leave less. Factors this near to 1 are right.
 REMAINDER, NEAR_ONE = 0.05, 0.25
 # Entries of Jacobians agree to this share: rounding is larger in differences.
 SAME_ENTRY = 1e-5
@@ -151,7 +151,7 @@ def _count_reached(motion: Trajectory, q: FloatArray) -> int:
 
 
 def _reached_parts(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield how often the tool has its position and its rotation, if one of both is missed."""
+    """Yield how often the tool has its position and its rotation, if either is missed."""
     parts = [_parts_reached(motion, motion.q) for motion in motions if _is_solve(motion)]
     is_reached = np.concatenate([*parts, np.zeros((0, 2), dtype=bool)])
     at_position, in_rotation = np.sum(is_reached, axis=0).tolist()
@@ -192,7 +192,7 @@ def _readings(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
 
 
 def _reported_velocities(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield the fewest terms whose sum is the reported velocities, if it is not the right one."""
+    """Yield the fewest terms whose sum is the reported velocities, unless these are right."""
     moving = [motion for motion in motions if motion.velocities is not None]
     if not moving:
         return
@@ -222,7 +222,7 @@ _VELOCITY = sentence("the tool's velocity")
 
 
 def _single_iterations(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
-    """Yield what single iterations make of errors, of robots that can move freely."""
+    """Yield what single iterations make of errors, of freely moving robots."""
     rows = []
     for motion in motions:
         if motion.inputs["max_iterations"] == 1 and motion.q.shape[1] >= MIN_COUNT:
@@ -252,7 +252,7 @@ def _tool_velocities(judgements: Sequence[CaseJudgement]) -> Iterator[Sentence]:
 
 
 PARTS = (sentence("linear part"), sentence("angular part"))
-# Where an error or a velocity is seen: as it is, along the tool's axes, rotated once too often.
+# Frames of an error or a velocity: unchanged, along the tool's axes, rotated once too often.
 AXES = ("fi->fi", "fji,fj->fi", "fij,fj->fi")
 FACTORS = (
     sentence("The {part} of {what} is {factor:.3g} times the right one in all {count} cases."),
@@ -266,7 +266,7 @@ FACTORS = (
 def _factors(
     moves: FloatArray, twists: FloatArray, frames: FloatArray, what: Sentence
 ) -> Iterator[Sentence]:
-    """Yield which factor of the right one each part of the tool's motion is, in whose axes."""
+    """Yield the factor of each part of the tool's motion to the right motion, and its axes."""
     for part, words in enumerate(PARTS if len(moves) >= MIN_COUNT else ()):
         columns = slice(3 * part, 3 * part + 3)
         move, twist = moves[:, columns], twists[:, columns]

@@ -1,7 +1,7 @@
-"""Where a quantity is wrong: the feature that all wrong elements have, and no right element has.
+"""Where a quantity is wrong: the feature of all wrong elements, and of no right element.
 
-An element is a joint, a particle or a whole case. A statement needs evidence that chance does not
-give: wrong and right elements side by side in some cases, and few features for many elements.
+An element is a joint, a particle or a whole case. A statement needs evidence beyond chance: wrong
+and right elements side by side in some cases, and few features for many elements.
 """
 
 import tomllib
@@ -16,23 +16,24 @@ from plumbob.reference.arguments import BoolArray
 from plumbob.text.sentence import Sentence, sentence
 
 # Relative errors up to this are right: above rounding in single precision, which is about 1e-6
-# after a dozen operations. Errors of more than BETWEEN times as much are wrong, and errors between
-# the two count for neither: they may be a large rounding or a small mistake.
+# after a dozen operations. Errors of more than BETWEEN times as much are wrong. Errors between the
+# two count for neither: a large rounding or a small mistake is possible.
 TOLERANCE, BETWEEN = 1e-5, 10.0
-# The number of cases in which wrong and right elements must stand side by side, or of wrong and of
-# right cases: two coincide too often.
+# The number of cases with wrong and right elements side by side, or of wrong and of right cases.
+# Two coincide too often.
 MIN_CASES = 3
-# The logarithm of the expected number of features that separate shuffled labels: 1 %. A feature
-# that separates one side alone needs the square of that, since it has more ways to be true.
+# The logarithm of the expected number of separating features for shuffled labels: 1 %. A feature of
+# one side alone needs the square of this number, since more features are one-sided.
 MAX_CHANCE = -2.0
-# Elsewhere a one-sided statement allows at most this share of exceptions: with more it says little.
+# Elsewhere a one-sided statement allows at most this share of exceptions: with more a statement
+# says little.
 MAX_EXCEPTIONS = 0.25
-# A quantity is reported as right everywhere if it has so many elements.
+# A quantity of so many elements is reported as right everywhere.
 MIN_RIGHT = 10
-# Alternatives to a statement that are printed.
+# Printed alternatives to a statement.
 MAX_ALTERNATIVES = 2
 
-# Quantities that no honest choice changes: wrong everywhere, they say most.
+# Quantities beyond honest choices: wrong everywhere, these say most.
 LAWS = ("agreement", "length", "root_position", "rotation", "position")
 
 _TABLE = tomllib.loads(Path(__file__).with_name("words.toml").read_text(encoding="utf-8"))
@@ -52,7 +53,7 @@ class JudgedElement(NamedTuple):
 
 
 class Predicate(NamedTuple):
-    """A feature or its negation, and the elements that have the feature or lack it."""
+    """A feature or its negation, and the elements with or without the feature."""
 
     words: Sentence
     is_negation: bool
@@ -68,7 +69,7 @@ class Statement(NamedTuple):
 
 
 class ElementTable:
-    """The elements of a quantity; cases with a right verdict, the sound ones, have no wrong one.
+    """The elements of a quantity; sound cases, with a right verdict, have no wrong element.
 
     What differs from the usual in a sound case is another honest choice.
     """
@@ -88,7 +89,7 @@ class ElementTable:
     ) -> None:
         """Add the elements of a case by their errors; features are arrays or shared by all.
 
-        Elements that are not counted are left out, as are errors between right and wrong.
+        Uncounted elements are left out, as are errors between right and wrong.
         """
         errors = np.atleast_1d(np.asarray(errors, dtype=float))
         wrong = ~(errors <= BETWEEN * tolerance)  # NaN is wrong
@@ -128,10 +129,10 @@ class Findings(NamedTuple):
 
 
 def separation(table: ElementTable) -> Statement | None:
-    """Return the feature of all wrong elements and no others, else a one-sided one, else None.
+    """Return the feature of all wrong elements and no others, else a one-sided feature, else None.
 
-    Joints and particles are compared within the cases that have wrong ones: elsewhere a mistake
-    could not show.
+    Joints and particles are compared within the cases of wrong elements: elsewhere a mistake could
+    not show.
     """
     wrong_cases = {element.case for element in table.elements if element.is_wrong}
     elements = [e for e in table.elements if table.is_of_cases or e.case in wrong_cases]
@@ -154,7 +155,7 @@ def separation(table: ElementTable) -> Statement | None:
 
 
 def _labels(elements: Sequence[JudgedElement], is_of_cases: bool) -> list[list[bool]]:
-    """Return which elements are wrong, by case, or as one list if each is a case."""
+    """Return which elements are wrong, by case, or as a single list if each element is a case."""
     labels: dict[str, list[bool]] = {}
     for element in elements:
         labels.setdefault("" if is_of_cases else element.case, []).append(element.is_wrong)
@@ -169,12 +170,12 @@ def _support(groups: Sequence[Sequence[bool]], is_of_cases: bool) -> int:
 
 
 def _log_chance(groups: Sequence[Sequence[bool]]) -> float:
-    """Return log10 of the chance that a feature separates labels shuffled within each group."""
+    """Return log10 of the chance of a feature to separate labels shuffled within each group."""
     return -sum(log10(comb(len(labels), sum(labels))) for labels in groups)
 
 
 def _predicates(elements: Sequence[JudgedElement]) -> Iterator[Predicate]:
-    """Yield each feature that some elements have and some lack, and its negation."""
+    """Yield each feature of some elements but not of all, and its negation."""
     shared = [n for n in elements[0].features if all(n in e.features for e in elements)]
     for name in shared:
         mask = np.array([element.features[name] for element in elements], dtype=bool)
@@ -213,7 +214,7 @@ def _stated(predicate: Predicate) -> Sentence:
 def _one_sided(
     quantity: Sentence, predicate: Predicate, wrong: BoolArray, elements: Sequence[JudgedElement]
 ) -> tuple[float, Sentence] | None:
-    """Return a weight and the words if all wrong elements have a feature, or all with it are wrong.
+    """Return a weight and the words if a feature has all wrong elements, or no right element.
 
     Few elements may be exceptions.
     """

@@ -1,7 +1,7 @@
-"""What answers of mass-spring systems show: the fewest terms that their equations have.
+"""What answers of mass-spring systems show: the fewest terms of their equations.
 
-All pulls of springs, all displacements of free particles and all velocities are held against sums
-of few terms with one coefficient each.
+All pulls of springs, all displacements of free particles and all velocities are compared with sums
+of few terms, a coefficient each.
 """
 
 from collections import defaultdict
@@ -31,9 +31,9 @@ from .pulls import (
 from .separation import MIN_CASES, TOLERANCE, ElementTable, Findings, Statement
 from .spring_law import law_words
 
-# An equation needs so many springs more than it has terms to have three terms.
+# An equation of three terms needs so many springs more than terms.
 SPRINGS_FOR_THREE = 25
-# A gravity is constant if it differs by less between answers [m/s²], requests by more.
+# A gravity is constant if answers differ by less [m/s²], requests by more.
 SAME_GRAVITY, OTHER_GRAVITY = 1e-4, 0.1
 
 
@@ -77,7 +77,7 @@ def spring_evidence(
 
 
 def _pull(solved: Sequence[Pulls]) -> bool:
-    """Return whether enough answers tell pulls, and springs pull by them."""
+    """Return whether enough answers tell pulls, and springs pull by these terms."""
     return len(solved) >= MIN_CASES and any(np.abs(part.pulls).max() > 1e-9 for part in solved)
 
 
@@ -97,7 +97,7 @@ def _add_motion(
     sound: Set[str],
     evidence: Findings,
 ) -> None:
-    """Add the right equation of motion, read in the way in which most particles keep it."""
+    """Add the right equation of motion, in the reading of most particles."""
     best = max(residuals, key=lambda key: _right_share(residuals[key]))
     is_force = best[0] == "forces"
     particles = ElementTable("force" if is_force else "motion", sound)
@@ -211,7 +211,7 @@ def _add_gravity(solved: Sequence[Pulls], evidence: Findings) -> None:
 def _sum_of(
     cases: Sequence[SpringCase], quantity: Any, symbols: Sequence[str]
 ) -> list[Term] | None:
-    """Return the fewest terms that are a quantity of all free particles."""
+    """Return the fewest terms of a quantity of all free particles."""
     return fit(_stacked(cases, quantity), {s: _stacked(cases, TERMS[s]) for s in symbols}, 2)
 
 
@@ -228,7 +228,7 @@ def _speed(case: SpringCase) -> float:
 
 
 def _differ(cases: Sequence[SpringCase]) -> bool:
-    """Return whether requests have two time steps, if they have any, and two gravities."""
+    """Return whether requests have two time steps, if any, and two gravities."""
     hs, gs = {case.h for case in cases}, {tuple(case.gravity) for case in cases}
     return len(gs) > 1 and (len(hs) > 1 or all(case.forces is not None for case in cases))
 
@@ -293,7 +293,7 @@ def _gravity_shares(substeps: int) -> Sequence[float]:
 
 
 def _add_velocities(cases: Sequence[SpringCase], evidence: Findings, substeps: int) -> None:
-    """Add of which differences of positions and old velocities the new ones are a sum."""
+    """Add the sum of differences of positions and old velocities in new velocities."""
     cases = [c for c in cases if c.end is not None and c.end_v is not None and len(c.free)]
     cases = [case for case in cases if not case.problem.external.any()]
     if len(cases) < MIN_CASES or not _differ(cases):
