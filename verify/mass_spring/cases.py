@@ -1,7 +1,7 @@
 """Cases of mass-spring systems, the smallest first, fitted to the systems that a solver takes.
 
-Each probe is a small case that adds an aspect of a step to the cases before it: flight, a spring,
-a damper, a pin, a changed h. Faults are sought along the probes.
+Each probe is a small case with another aspect of a step than the cases before: flight, a spring, a
+damper, a pin, a changed h. Faults are sought along the probes.
 """
 
 import tomllib
@@ -25,11 +25,11 @@ TELLING_PAIRS = 16
 # In place of the mass 1, which hides what is divided by it.
 ONE_MASS = 0.8
 MOTION_STEPS = 6
-# Families without sense in a plane: turned about an axis of it, or free to buckle within it.
+# Families without sense in a plane: turned about an axis in the plane, or free to buckle there.
 SPATIAL = ("symmetry", "compression")
-# Families that need no gravity, or one in another direction.
+# Families without a need of gravity, or with gravity in another direction.
 OF_GRAVITY = ("rest", "gravity")
-# Families that compare steps of different lengths, or need a short one.
+# Families of steps of different lengths, or of a short step.
 OF_H = ("h changes", "small h")
 # Dampers of a step that add no forces of springs' dampers.
 UNDAMPED = ("none", "global_factor")
@@ -127,7 +127,7 @@ def _has(system: System, need: str) -> bool:
 
 
 def _with_gravity(drawn: Sequence[SpringScene], gravity: FloatArray) -> list[SpringScene]:
-    """Return the scenes that make sense with a gravity [m/s²] that never changes."""
+    """Return the scenes for a constant gravity [m/s²]."""
     return [
         replace(scene, gravity=gravity)
         for scene in drawn

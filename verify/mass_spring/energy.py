@@ -1,7 +1,7 @@
 """The task energy: its cases and its judgement.
 
-Zero of the gravitational energy is where the solver has it: the states of a case are asked in
-several places, and only differences to the first of them count.
+The solver chooses the zero of the gravitational energy. The states of a case are asked in several
+places, and only differences to the first place count.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -44,7 +44,7 @@ ROUNDINGS = 16.0
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return cases that suit the solver, most of them followed by the same case displaced."""
+    """Return suitable cases, mostly followed by the same case displaced."""
     pairs = ([case] if "of" in case.facts else [case, _displaced(case, seed)]
              for case in task_cases(TASK, greeting, seed, thorough))  # fmt: skip
     return [case for pair in pairs for case in pair]

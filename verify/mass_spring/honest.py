@@ -1,4 +1,4 @@
-"""The choices that an honest solver may make, and which of them a greeting leaves open."""
+"""The choices of honest solvers, and the open choices of a greeting."""
 
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -1,7 +1,7 @@
 """Follow the iterations of a step up to answers that are not converged.
 
-An iteration that ends too early leaves one of its iterates. It shows what converged answers hide:
-the test by which the iteration ends.
+The answer of iterations with an early end is an iterate. It shows what converged answers hide: the
+test by which the iteration ends.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -31,12 +31,12 @@ from .model import (
 from .model_search import LARGEST, Probe
 from .problem import SpringProblem
 
-# The most iterations that are followed; few solvers make more. Of other methods than Newton's it is
-# that number and ten times the number of coordinates.
+# The most iterations that are followed; few solvers make more. Methods other than Newton's have
+# this number and ten times the number of coordinates.
 MAX_ITERATIONS = 100
 # An answer is an iterate up to this share of its distance from the right positions.
 SAME = 1e-5
-# An iteration that moves by less than this share of the distance to an answer does not reach it.
+# An iteration below this share of the distance to an answer does not reach the answer.
 STATIONARY = 1e-6
 # A method must reproduce so many wrong answers, the smallest, before all are compared.
 TRIALS = 3
@@ -102,10 +102,10 @@ class Track(NamedTuple):
 def explanation(
     model: StepModel, probes: Sequence[Probe], start: str | None, epsilon: float
 ) -> Explanation | None:
-    """Return that iterations end too early where that leaves the wrong answers, else None.
+    """Return the explanation by early ends if all wrong answers are iterates, else None.
 
-    It is None where no error is larger than `IMPRECISE` of the displacement. Iterations that end by
-    no known test give way to those with one.
+    It is None where no error is larger than `IMPRECISE` of the displacement. Iterations without a
+    known test at their end give way to iterations with a test.
     """
     trials = trials_of(model, probes, epsilon)
     wrong = [trial for trial in trials if trial.error > SOLVED and not trial.is_unlike]
@@ -179,7 +179,7 @@ def _trial(model: StepModel, epsilon: float, probe: Probe) -> StepAnswer:
 def _explanation(
     integrator: Integrator, tracks: Sequence[Track | None], trials: Sequence[StepAnswer]
 ) -> Explanation | None:
-    """Return that answers are iterates; their share is that of all or, if less, of wrong ones."""
+    """Return the explanation of answers as iterates, by the lesser share of all or wrong."""
     wrong, pairs = np.array([trial.is_wrong for trial in trials]), zip(tracks, trials, strict=True)
     hits = np.array([track is not None and not trial.is_unlike for track, trial in pairs])
     share = float(min(hits.mean(), hits[wrong].mean()))
@@ -189,7 +189,7 @@ def _explanation(
 
 
 def _words(integrator: Integrator, tracks: Sequence[Track | None]) -> tuple[str, Sentence]:
-    """Return the code of iterations that end early, and the test by which they do."""
+    """Return the code of early ends of iterations, and the test at these ends."""
     early = [track for track in tracks if track is not None and track.is_early]
     ends, test = [len(track.residuals) - 1 for track in early], _ending(tracks)
     if test is None and min(ends) == max(ends):
@@ -231,7 +231,7 @@ def _integrators(model: StepModel, starts: Sequence[str]) -> Iterator[Integrator
 
 
 def _track(model: StepModel, trial: StepAnswer) -> Track | None:
-    """Return the iterates up to an answer, None if it is not among them."""
+    """Return the iterates up to an answer, None if the answer is no iterate."""
     equation = first_equation(trial.problem, model)
     is_slow = model.integrator.method != "newton"
     limit = MAX_ITERATIONS + 10 * trial.positions.size * is_slow
@@ -255,7 +255,7 @@ def _track(model: StepModel, trial: StepAnswer) -> Track | None:
 def _iteration(
     equation: StepEquation, start: FloatArray
 ) -> tuple[Iterator[FloatArray], Callable[[FloatArray], FloatArray]]:
-    """Return the iterates from a start, and the residuals that they leave."""
+    """Return the iterates from a start, and their residuals."""
     p, model, x_n, _, _, _ = equation.start
     if model.integrator.method != "linear":
         return ITERATES[model.integrator.method](equation, start), equation.free_gradient

@@ -1,4 +1,4 @@
-"""Laws of every step and of the step that a solver declares, and the rounding that they allow."""
+"""Laws of every step and of the declared step of a solver, and the allowed rounding."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from .honest import ITERATIVE
 from .model import EXPLICIT, Scaling, StepModel
 from .problem import SpringProblem, accelerations, damper_forces, frames, state_of, system_of
 
-# A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, as
-# the inputs themselves are in single precision.
+# A sum of some ten terms, a few products and a square root, each rounded by half an epsilon, like
+# the inputs in single precision.
 ROUNDINGS = 4.0
 # What an iterative linear solver may leave of a displacement, and a velocity, without being taken
 # for another model.
@@ -50,10 +50,10 @@ def rounding(p: SpringProblem, model: StepModel, epsilon: float) -> Rounding:
     """Return bounds for an honest solver of that precision.
 
     A coordinate is rounded by epsilon of its size in each substep, always to the same side where
-    the increments are alike. Lengths are rounded as coordinates are, and h² k / m of them enters
-    the right-hand side of a step; M + h² L is conditioned by 1 + h² k / m. An unstable explicit
-    step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by
-    the largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
+    the increments are alike. Lengths are rounded like coordinates, and h² k / m of lengths enters
+    the right-hand side of a step. The condition of M + h² L is 1 + h² k / m. An unstable explicit
+    step multiplies earlier errors by hs² k / m. The largest eigenvalue of M^-1 L is bounded by the
+    largest sum of |k| + |c| / h over the springs of a particle, times 2 / m.
     """
     n, steps, growth = model.substeps, p.steps or 1, 1.0
     if model.integrator.explicit:

@@ -193,7 +193,7 @@ def _rates(start: Substep, x: FloatArray, v: FloatArray) -> FloatArray:
 def _by_one_rate(start: Substep) -> State:
     """Step by one acceleration: explicit or symplectic Euler, or x + h v + h²/2 a.
 
-    It is that of the start, or of the new positions where these come first.
+    The force is at the start, or at the new positions where these come first.
     """
     model, x, v, h = start.model, start.x, start.v, start.h
     method, (factor, place) = model.integrator.method, model.scaling
@@ -329,7 +329,8 @@ def _solve(A: FloatArray, right: FloatArray, is_free: BoolArray) -> FloatArray:
     return solution.reshape(right.shape)
 
 
-# The share of a spring's stiffness across it, given r/l; along it, that is 1.
+# The share of a spring's stiffness across its direction, given r/l; along the spring the share is
+# 1.
 HESSIANS: Mapping[str, Callable[[FloatArray], FloatArray]] = {
     "exact": lambda ratio: 1.0 - ratio,
     "gauss": lambda ratio: 0.0 * ratio,

@@ -45,7 +45,7 @@ class Probe(NamedTuple):
         return self.problem.stiff or self.problem.damped
 
     def aspects(self) -> list[str]:
-        """Return the aspects that matter, in the order in which they are chosen."""
+        """Return the relevant aspects, in the order of choice."""
         more = {"damper": self.problem.damped, "pins": self.problem.pinned.size}
         return [*ALWAYS, *(aspect for aspect, matters in more.items() if matters)]
 

@@ -1,7 +1,7 @@
 """A small mass-spring system as dense arrays.
 
-Its forces are written from the formulas, apart from `reference`: a spring pulls its first end with
--(k (l - r) + c (v_i - v_j)·u) u.
+Its forces are written from the formulas, without `reference`. A spring pulls its first end with -(k
+(l - r) + c (v_i - v_j)·u) u.
 """
 
 import dataclasses

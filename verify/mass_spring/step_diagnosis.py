@@ -1,4 +1,4 @@
-"""Explain wrong steps by honest ones: another than declared, or iterations that end early."""
+"""Explain wrong steps by undeclared honest steps, or by early ends of iterations."""
 
 from collections.abc import Sequence
 from dataclasses import replace
