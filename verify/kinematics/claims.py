@@ -1,7 +1,7 @@
 """Claims of answers: formulas that give their residual, their success or their positions.
 
-The entries of the table `claim` in `faults.toml` name an output, and the formula that gives it in a
-program with the fault, whatever its method is. The names in formulas are those of `values_of`.
+The entries of the table `claim` in `faults.toml` name an output, and the formula of this output in
+a program with the fault, for any method. The names in formulas are those of `values_of`.
 """
 
 import itertools
@@ -22,8 +22,8 @@ from .faults import TABLE
 from .pose_laws import AnsweredPose
 from .predictions import solve
 
-# What an output is in a right program. The rotations of an answer are compared as the positions
-# that they give, those that are `placed`.
+# What an output is in a right program. The rotations of an answer are compared as positions by
+# these rotations, the `placed` positions.
 RIGHT = {
     "residual": "distance",
     "converged": "distance <= tolerance",
@@ -31,15 +31,15 @@ RIGHT = {
     "positions": "placed",
     "placed": "positions",
 }
-# Claims that follow from a false residual, and those of a solver that believes to be at its target.
+# Claims by a false residual, and claims of a solver with the belief to be at its target.
 FOLLOWS = "success by the reported residual"
 BELIEVED = {FOLLOWS, "success where it gave up", "success where sweeps are left"}
-# The laws that false outputs break, beside any that a pose breaks.
+# The laws broken by false outputs, beside laws broken by poses.
 LAWS = {"claims", "root in place", "link lengths", "branches", "rotations agree with positions"}
-# The least number of answers that a formula is compared with, and the share that it has to give.
+# The least number of answers to compare with a formula, and the share to match.
 MIN_ANSWERS, MIN_SHARE = 4, 0.9
-# Positions that differ by less than this share of the skeleton's size are the same, by precision;
-# those after sweeps by so many times as much.
+# Positions within this share of the skeleton's size are the same, by precision. Positions after
+# sweeps may differ by so many times as much.
 SAME, AFTER_SWEEPS = {"double": 1e-9, "single": 1e-4}, 1e3
 NAMES = {
     "abs": np.abs, "norm": np.linalg.norm, "np": np, "where": np.where,
@@ -143,9 +143,9 @@ def _sweeps(
 
 
 def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
-    """Return for each output that is wrong in answers the fault that gives most of them, if any.
+    """Return for each wrong output the fault with most of its answers, if any.
 
-    It gives nearly all numbers, and everything that is either true or false.
+    The fault gives nearly all numbers, and all booleans.
     """
     explanations = []
     for output, truth in TRUTHS.items():
@@ -163,13 +163,13 @@ def explanations(answers: Sequence[Mapping[str, Any]]) -> list[Explanation]:
 
 
 def _share(fault: ClaimFault, answers: Sequence[Mapping[str, Any]]) -> float:
-    """Return the share of answers that a fault gives, of all for which it has a value."""
+    """Return a fault's share of answers, among the answers with a number by the fault."""
     matches = [_agrees(fault.formula, fault.output, values) for values in answers]
     return matches.count(True) / max(len(matches) - matches.count(None), 1)
 
 
 def _agrees(formula: CodeType, output: str, values: Mapping[str, Any]) -> bool | None:
-    """Return whether a formula gives an output, None if it has no value or rounding decides it."""
+    """Return whether a formula gives an output, None without a number or if rounding decides."""
     try:
         with np.errstate(all="ignore"):
             low, high = (
@@ -185,7 +185,7 @@ def _agrees(formula: CodeType, output: str, values: Mapping[str, Any]) -> bool |
 
 
 def _ends_by_residual(diagnosis: Diagnosis, answers: Sequence[Mapping[str, Any]]) -> bool:
-    """Return whether solves end by the residual that they report, where all else is right."""
+    """Return whether solves end by their reported residual, where all else is right."""
     faults = {key for explanation in diagnosis.explanations for key in explanation.faults}
     return bool(faults) and faults <= TABLE["stop"].keys() and all(
         values["residual"] <= values["tolerance"] + values["same"]

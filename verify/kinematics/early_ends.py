@@ -23,8 +23,8 @@ KEY, SQUARED = "early by another test", "tolerance against the squared distance"
 EARLY_ENDS = {KEY, SQUARED}
 # So many solves end early, at least, if squared distances end them.
 LEAST_EARLY = 3
-# A pose is that after a sweep up to this share of the skeleton's size, by precision, or if it is
-# so many times nearer to it than to that after any other: sweeps enlarge rounding.
+# A pose belongs to a sweep within this share of the skeleton's size, by precision. It also belongs
+# to a sweep if all others are so many times as far: sweeps enlarge rounding.
 SAME_POSE, NEARER = {"double": 1e-7, "single": 1e-5}, 30.0
 
 

@@ -35,7 +35,7 @@ HONEST: Mapping[str, tuple[HonestSweeps, ...]] = {
     "fabrik": STOPS[:-1],  # the last stop is CCD's own
 }
 ROOT_FIRST = Choices(root_first=True)
-# A sweep that may end in its middle: each iteration rotates one joint of a sweep.
+# A sweep with a possible end in its middle: each iteration rotates one joint of a sweep.
 AFTER_EACH_JOINT = HonestSweeps(
     Choices(sweep_of_a_joint=True),
     sentence("It is CCD that ends a sweep as soon as the effector is within the tolerance."),

@@ -37,7 +37,7 @@ def diagnose(judged_answers: JudgedAnswers) -> Diagnosis:
 def _diagnosis(
     trials: Sequence[PoseTrial], comparison: SweepComparison, greeting: Greeting
 ) -> Diagnosis:
-    """Return the test that ends the solves too early, if such a test explains them."""
+    """Return the test at too early ends of solves, if a test explains all."""
     diagnosis = Diagnosis(behaviour=comparison.damped or comparison.behaviour)
     must = [t for t in trials if t.pose.outputs and t.case.requirement == "must" and t.pose.finite]
     if comparison.damped or any(t.case.name in comparison.wrong for t in must):

@@ -36,15 +36,15 @@ STOPS, SLOW, ENDED = "sweeps made", "target reached, slow", "target reached, end
 METHODS = ("ccd", "fabrik")
 # Sweeps that change the distance by a smaller share of the reach than this have stalled.
 STALLED = 1e-9
-# The verdict on a solver of its own method that answers otherwise in another world: the origin is
+# The verdict on a solver of its own method with other answers in another world. The origin is
 # arbitrary; angles about fixed axes (Euler angles) and dampings with a unit are honest choices.
 WORLDS = {
     "shifted": Verdict.WRONG,
     "rotated": Verdict.RIGHT_EXCEPT,
     "in other units": Verdict.RIGHT_EXCEPT,
 }
-# A solver of its own method that misses no larger share of the targets is slow there, not wrong:
-# CCD from the root is after 60 sweeps from a straight arm two thirds as far as at the start.
+# A solver of its own method with no larger share of missed targets is slow there, not wrong. CCD
+# from the root is after 60 sweeps from a straight arm two thirds as far as at the start.
 FEW_MISSES = 0.1
 WORLDS_IN_WORDS = {
     "shifted": sentence("in a shifted world"),
@@ -113,7 +113,7 @@ def judged_trials(
 
 
 def _reaches_most(trials: Sequence[PoseTrial]) -> bool:
-    """Return whether a solver of its own method misses few of the targets that it can reach."""
+    """Return whether a solver of its own method misses few reachable targets."""
     solves = [t for t in trials if not t.is_sweep and t.case.facts["least"] == 0.0]
     missed = [t for t in solves if any(map(_is_miss, t.judgement.findings))]
     return len(missed) <= FEW_MISSES * len(solves)
@@ -124,7 +124,7 @@ def _is_miss(entry: Finding) -> bool:
 
 
 def _forgive(case: Case, broken: Finding) -> Finding:
-    """Return a reservation where a right but slower solver misses a target that it approaches."""
+    """Return a reservation where a right but slower solver misses an approached target."""
     gained = case.facts["before"] - case.facts["least"]
     if not _is_miss(broken) or broken.error >= gained:
         return broken

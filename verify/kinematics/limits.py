@@ -1,8 +1,8 @@
 """Chains with limits: whether joints keep them, targets are reached, and how limits are misread.
 
-A local rotation is split into a twist about the joint's axis and the tilt of that axis. A cone of
-0 makes a hinge. Solvers that keep limits may stall, each elsewhere, so that a missed target alone
-is a reservation; a solver that misses most of those that CCD and FABRIK reach is wrong.
+A local rotation is split into a twist about the joint's axis and the tilt of that axis. A cone of 0
+makes a hinge. Solvers within limits may stall, each elsewhere, so a missed target alone is a
+reservation. A solver is wrong if most targets within reach of CCD and FABRIK are missed.
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -33,7 +33,7 @@ SWEEPS = {"ccd": 20, "fabrik": 50}
 # To a target as near as this [m] no joint need rotate farther than JUMP [rad]: the reference's
 # methods rotate none half as far.
 NEAR, JUMP = 0.1, 1.0
-# Programs that misread limits miss some targets by so much [m], and those that ignore them rotate
+# Programs with misread limits miss some targets by so much [m]. Programs without limits rotate
 # joints so far beyond [rad].
 MISSED, BEYOND = 0.02, 0.2
 # A misreading explains answers in which so many more joints are at an end of their limits.
@@ -94,7 +94,7 @@ def solve_within(method: str, inputs: Inputs) -> FloatArray:
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return chains with hinges and cones, if the greeting declares that it keeps limits.
+    """Return chains with hinges and cones, if the greeting declares limits.
 
     Single sweeps of the textbook's methods follow, which show how limits are kept.
     """
@@ -265,7 +265,7 @@ def _limits_kept(local: FloatArray, case: Case, greeting: Greeting) -> Finding:
                    value=float((twist if kind else tilt)[joint]))  # fmt: skip
 
 
-# Yields limits as a program reads them, and the rotations that it limits, given those it answers.
+# Yields limits in a program's reading, and the limited rotations, given the answered rotations.
 Reading = Callable[[Inputs, FloatArray], Iterator[tuple[JointLimits, FloatArray]]]
 
 
@@ -319,8 +319,8 @@ def _in_the_world(inputs: Inputs, local: FloatArray) -> Iterator[tuple[JointLimi
         yield limits._replace(axes=axes), local
 
 
-# The readings of limits, by the keys of `faults.toml`: "" is the right one. Of the readings that
-# answers keep, that which most joints are at an end of explains them; the earlier of equals.
+# The readings of limits, by the keys of `faults.toml`: "" is the right one. Among the readings kept
+# by answers, the explanation is the reading with most joints at an end; the earlier of equals.
 READINGS: Mapping[str, Reading] = {
     "": _of_limits(lambda limits: limits),
     "half angles of cones": _of_limits(partial(_scaled, 2.0, FIELDS[1:2])),

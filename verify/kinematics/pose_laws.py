@@ -18,8 +18,8 @@ from ..laws import finding, not_finite, of_joints
 from . import rounding
 from .predictions import with_effector_of
 
-# Below this share of the size, in single precision, rotations that a helper rounds to the identity
-# separate positions from rotations: one dead angle a joint.
+# Below this share of the size, in single precision, rotations rounded to the identity separate
+# positions from rotations: a dead angle a joint.
 DEAD_JOINTS = 4.0
 # Larger positions are clipped to this [m]: `judge_pose` takes none beyond 1e75.
 FARTHEST = 1e74
@@ -61,10 +61,9 @@ class AnsweredPose:
 
     @property
     def outputs(self) -> Mapping[str, Any]:
-        """The outputs that are compared with variants, all joints' and those of the path alone.
+        """The outputs to compare with variants, of all joints and of the path alone.
 
-        Positions that are those of the rotations say nothing of their own: they need not be a
-        solver's last points.
+        Positions by the rotations say nothing of their own, and need not be a solver's last points.
         """
         outputs: dict[str, Any] = {}
         x = self.answered_positions
@@ -202,7 +201,7 @@ def _repetitions(case: Case) -> int:
 
 
 def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: float) -> Finding:
-    """Return whether the children of a joint keep their distances: they rotate as one body."""
+    """Return whether the children of a joint keep their distances, like a rigid body."""
     error, joint = 0.0, 0
     for j in range(2, len(parents)):
         for sibling in np.flatnonzero(parents[:j] == parents[j]):
@@ -214,7 +213,7 @@ def _branches(x: FloatArray, parents: IndexArray, offsets: FloatArray, bound: fl
 
 
 def _agreement(pose: AnsweredPose, case: Case, bound: float, greeting: Greeting) -> list[Finding]:
-    """Return whether the positions are those that the rotations give."""
+    """Return whether the positions agree with the rotations."""
     errors = None if pose.judgement is None else pose.judgement.position_errors
     carriers = case.inputs["parents"][1:]
     if errors is None or pose.local is None or not np.isfinite(pose.local[carriers]).all():

@@ -30,11 +30,11 @@ MAX_AMPLIFICATION = 30.0
 # A target counts as easy if both textbook solvers reach it in EASY sweeps; ALLOWED are allowed.
 EASY, ALLOWED = 12, 60
 DRAWS = 2000
-# The numbers of sweeps that follow a single one, after a wrong verdict.
+# The numbers of sweeps after a single sweep, for wrong verdicts.
 COUNTED = (2, 5, 60)
 LOOSE = 1e-2
-# Sweeps of a constant number go to targets so far beyond reach [m], if no tolerance asks for more;
-# their last rotations are small and lose a digit more.
+# Sweeps of a constant number go to targets so far beyond reach [m], if no tolerance asks for more.
+# Their last rotations are small and lose a digit more.
 BEYOND, SMALL_ANGLES = 1e-2, 10.0
 
 
@@ -199,7 +199,7 @@ def _shows_stop(test: str, method: str, problem: TargetProblem) -> bool:
 def _stalled(method: str, inputs: Mapping[str, Any]) -> tuple[FloatArray, int]:
     """Return the positions of the first sweep that changes the distance by little, and its number.
 
-    It is the last one allowed if none does.
+    The number is the last allowed number if none does.
     """
     before, x = np.inf, forward(inputs)[0]
     for count in range(1, ALLOWED + 1):

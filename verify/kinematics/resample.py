@@ -21,10 +21,10 @@ from .report import report
 from .skeletons import generator
 
 TASK = "resample"
-# Points are even if no gap along the line differs from the mean by more than this share: chords
-# of a fine polyline are shorter than its arcs by as much.
+# Points are even if no gap along the line differs from the mean by more than this share. Chords of
+# a fine polyline are shorter than its arcs by as much.
 UNEVEN = 0.02
-# By spacing, gaps from a half of it to the whole are as even as a rule that keeps corners allows.
+# Gaps from half the spacing to the whole are even, as for rules with kept corners.
 MIN_GAP = 0.5 - 1e-9
 
 

@@ -81,7 +81,7 @@ def judge(
     greeting: Greeting,
     method: str,
 ) -> TaskReport:
-    """Compare Jacobians with the reference in the convention that suits them; name the faults."""
+    """Compare Jacobians with the reference in the suitable convention; name the faults."""
     name, matches = _best_convention(exchanges, greeting)
     judgements = []
     for exchange in exchanges:
@@ -100,7 +100,7 @@ def judge(
 def _best_convention(
     exchanges: Sequence[Exchange], greeting: Greeting
 ) -> tuple[str, dict[str, bool]]:
-    """Return the convention that suits most answers, and by case whether it suits."""
+    """Return the suitable convention of most answers, and by case whether an answer agrees."""
     matches: dict[str, dict[str, bool]] = {name: {} for name in CONVENTIONS}
     for exchange in exchanges:
         if isinstance(exchange.answer, Answer) and "jacobian" in exchange.answer.values:

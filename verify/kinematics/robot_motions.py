@@ -52,7 +52,7 @@ EXCURSION = 0.3
 DRAWS = 20
 # The reference moves no joint farther in a frame of an easy motion [rad]; beyond reach it goes far.
 EASY = 2.0
-# The least singular value of the other joints' Jacobian that lets them do without a joint [m].
+# The least singular value of the other joints' Jacobian for motions without a joint [m].
 SPARE = 0.1
 _SEED = 1961
 _TABLE = tomllib.loads(Path(__file__).with_name("motions.toml").read_text(encoding="utf-8"))
@@ -184,7 +184,7 @@ def _is_easy(motion: ToolRequest) -> bool:
 
 
 def _draw_limited(arm: Inputs, rng: np.random.Generator) -> ToolRequest:
-    """Return a motion that leads a joint to a limit, and that the other joints can do alone."""
+    """Return a motion of a joint to a limit, possible for the other joints alone."""
     q = loop(BENT + rng.uniform(-0.2, 0.2, 7), rng)
     tool, start, upper = tool_pose(arm, q), q[0], arm["upper"].copy()
     free = followed(arm, start, tool) - start

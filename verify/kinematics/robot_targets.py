@@ -35,15 +35,15 @@ from .robot_models import (
 from .skeletons import suits
 
 TASK = "robot_inverse_kinematics"
-# Starts at the answer, near it, anywhere; targets that nothing reaches; a joint that comes to its
-# limit while the others can reach the target.
+# Starts at the answer, near it, anywhere; unreachable targets; a joint at its limit while the other
+# joints can reach the target.
 AT, CLOSE, ANYWHERE, BEYOND = "start at the target", "near start", "any start", "beyond reach"
 AT_A_LIMIT = "at a limit"
-# Starts off their targets by multiples of one tolerance; limits close to the start; a single
-# iteration, without a joint at its limit and with one.
+# Starts off their targets by multiples of a tolerance; limits close to the start; a single
+# iteration, without and with a joint at its limit.
 TOLERANCE, TIGHT, STEP = "off by tolerances", "tight limits", "a single iteration"
 LIMIT_STEP = "a single iteration at a limit"
-# The same of one iteration and more, from one start; no target need be reached.
+# The same of an iteration and more, from the same start; no target need be reached.
 FEW, MOST = "a few iterations", 5
 # Single iterations of tools that are rotated by nearly half a turn about x, y and z.
 HALF_TURNS = tuple(f"half a turn about {axis}" for axis in "xyz")
@@ -59,8 +59,8 @@ DISTANCE, SLIDE = 0.3, 0.1
 SHARE, DRAWS = 0.5, 50
 # Of so many configurations the least singular one is a target: near others solvers are slow.
 FEW_DRAWS = 4
-# A test passes all errors up to some multiple of the tolerance, which lies between two of these;
-# degrees are between the second and the third. No start is farther off [m, rad].
+# A test passes all errors up to some multiple of the tolerance between two of these. Degrees are
+# between the second and the third. No start is farther off [m, rad].
 RATIOS, MAX_ERROR = (3.0, 20.0, 90.0, 500.0), 0.6
 # The larger of two tolerances, of which square roots are other multiples than of the smaller.
 LARGE_TOLERANCE = 1e-3
@@ -72,9 +72,9 @@ WIDTHS, AWAY, FEW_ITERATIONS, SOME_ITERATIONS = (0.03, 0.09), 1.0, 40, 100
 STEP_DAMPINGS, CLEAR = (1e-6, 1e-3, 1e-1), 0.3
 # Rotations by nearly half a turn [rad].
 NEARLY_HALF = 2.9
-# Tools at starts before half a turn and targets beyond it are rotated so far from it [rad].
+# Tools at starts before half a turn and targets beyond are rotated so far from half a turn [rad].
 BEFORE_HALF = 0.15
-# The joints of robots that show one feature of their kinematics near their targets alone.
+# The joints of robots with a feature of their kinematics near their targets alone.
 ONE_FEATURE = 3
 _SEED = 1955
 
@@ -126,7 +126,7 @@ def _case(name: str, request: ToolRequest, tolerance: float) -> Case:
 def _requests(
     name: str, robot: Inputs, tolerance: float, rng: np.random.Generator
 ) -> Iterator[ToolRequest]:
-    """Yield the requests of a robot: those that the fewest robots show come last."""
+    """Yield the requests of a robot: requests of rare features come last."""
     lower, upper, joints = robot["lower"], robot["upper"], len(robot["lower"])
     generators = [rng, *np.random.default_rng(_SEED).spawn(FEW_DRAWS - 1)]
     answers = [
@@ -198,10 +198,10 @@ def _single_steps(robot: Inputs, rng: np.random.Generator) -> Iterator[ToolReque
 
 
 def _draw_limited(robot: Inputs, rng: np.random.Generator) -> ToolRequest | None:
-    """Return limits that one joint would leave on its way to a target, if the others suffice.
+    """Return limits on a joint's way to a target, if the other joints suffice.
 
-    By Klein and Huang (1983), a step of least length of all joints has a share of the joint that is
-    the diagonal entry of J^+ J.
+    By Klein and Huang (1983), a joint's share in a step of least length is the diagonal entry of
+    J^+ J.
     """
     start = _middle(robot, rng)
     target = tool_pose(robot, _near(robot, start, rng))

@@ -23,15 +23,15 @@ from .trajectories import LENIENT, Trajectory, limit_laws, trajectories
 
 TASK = robot_motions.TASK
 cases = robot_motions.cases
-# A tool may trail its target by so many of the target's displacements in a frame, as that of a
-# controller does that removes a sixth of the error in each frame.
+# A tool may trail its target by so many of the target's displacements in a frame. Controllers do so
+# if each frame removes a sixth of the error.
 TRAIL = 5.0
 # Errors and movements of joints die out if less than this share remains in the second half of rest.
 DECAY = 0.8
 # Errors of so many tolerances come from another test, or measure, rather than from moving targets.
 FEW_TOLERANCES = 10.0
-# At rest a tool may be off by this share of the target's largest displacement in a frame, as where
-# a posture task pulls at it.
+# At rest a tool may be off by this share of the target's largest displacement in a frame, as beside
+# a posture task.
 REMAINDER = 0.3
 # Joints rest if they move less in a frame [rad or m].
 AT_REST = 1e-4
@@ -41,7 +41,7 @@ NO_DRIFT = 1e-2
 SAME = 1e-2
 # The joints of a start beyond its limits are to be within after so many frames.
 RETURN = 10
-# What may be on another frame's target, and the components of twists that it has.
+# Parts of a pose on another frame's target, and their components of twists.
 PARTS = (
     (sentence("the tool is on"), np.ones(6)),
     (sentence("the position of the tool is that of"), np.repeat([1.0, 0.0], 3)),
@@ -120,7 +120,7 @@ def _limits(motion: Trajectory, greeting: Greeting) -> Finding:
 def _on_target(
     motion: Trajectory, motions: Mapping[str, Trajectory], greeting: Greeting
 ) -> Finding:
-    """Return the largest error at targets in reach; it may trail them, but not at rest."""
+    """Return the largest error at targets in reach; a tool may trail targets, but not at rest."""
     facts, twists = motion.case.facts, motion.twists(motion.q)
     slack = rounding.positions(greeting.epsilon, len(motion.previous[0]), facts["size"])
     errors = np.where(facts["reachable"], motion.errors(twists), 0.0)

@@ -34,12 +34,12 @@ LARGEST_LOSS = 0.25
 # Speeds beyond so many times those of least length come from a division by almost zero.
 FACTOR = 1e3
 SINGULAR = "a singular pose"
-# A Jacobian, and the velocity that the speeds give by it.
+# A Jacobian, and the velocity of the speeds by this Jacobian.
 Equation = tuple[FloatArray, FloatArray]
 
 
 def cases(greeting: Greeting, method: str, seed: int, thorough: bool) -> list[Case]:
-    """Return robots of one joint to seven, in random poses and in a singular one."""
+    """Return robots of one joint to seven, in random poses and in a singular pose."""
     rng = np.random.default_rng([_SEED, seed])
     return [
         case
@@ -92,11 +92,11 @@ def shortest_speeds(equation: Equation) -> FloatArray:
 
 
 def solving(equation: Equation, speeds: FloatArray) -> tuple[FloatArray, float]:
-    """Return the speeds that solve an equation, those nearest to an answer, and their damping d.
+    """Return the solutions of an equation, the speeds nearest to an answer, and their damping d.
 
-    Along a singular vector damped least squares give s b / (s^2 + d^2) for the velocity b
-    (Wampler 1986), which is less than b / s by the share d^2 / (s^2 + d^2); what the speeds are in
-    the null space is free. The damping explains the speed along the vector on which it tells most.
+    Along a singular vector damped least squares give s b / (s^2 + d^2) for the velocity b (Wampler
+    1986). This is less than b / s by the share d^2 / (s^2 + d^2); speeds in the null space are
+    free. The damping explains the speed along the vector on which it tells most.
     """
     J, twist = equation
     U, s, V = np.linalg.svd(J, full_matrices=False)

@@ -5,18 +5,18 @@
 ROUNDINGS_A_JOINT = 16.0
 # Rotations with a length error e stretch what they rotate by up to this times e at every joint.
 STRETCH = 4.0
-# Rounding alone takes thousands of products in single precision to a length error of this size; a
-# quaternion that is off by more was never made unit, and is judged as it stands.
+# Rounding alone takes thousands of products in single precision to a length error of this size. A
+# quaternion with a larger error was never made unit, and is judged unchanged.
 LARGEST_DRIFT = 1e-3
-# Helpers that give a rotation between two directions return the identity below an angle of about
-# sqrt(epsilon): 5e-4 rad in single precision, 1.5e-8 in double precision. Students' own helpers
-# often test the cross product against 1e-6.
+# Helpers for a rotation between two directions return the identity below about sqrt(epsilon): 5e-4
+# rad in single precision, 1.5e-8 in double precision. Students' own helpers often test the cross
+# product against 1e-6.
 DEAD_ANGLE = {"single": 5e-4, "double": 1e-6}
-# A solver that loses rotations below the dead angle comes to rest about a reach times that angle
-# from its target, and farther on a chain that is nearly straight.
+# A solver without rotations below the dead angle comes to rest about a reach times this angle from
+# its target. On a nearly straight chain the distance is larger.
 STALL = {"single": 4e-3, "double": 1e-5}
-# Rotations by arc cosine and sine lose digits near 0 and pi; the cases of single sweeps keep a
-# distance of 0.1 rad from both, where that is a factor of ten.
+# Rotations by arc cosine and sine lose digits near 0 and pi. The cases of single sweeps keep a
+# distance of 0.1 rad from both, where the loss is a factor of ten.
 SWEEP_ROUNDINGS = 10.0 * ROUNDINGS_A_JOINT
 
 
@@ -34,8 +34,8 @@ def lengths(epsilon: float, joints: int, sweeps: int) -> float:
     """Return how far rounding takes quaternions from unit length if none is made unit.
 
     A sweep multiplies the rotation of each joint by a product of up to `joints` quaternions. The
-    roundings of one sweep add up to those of all, at worst with one sign. Reversed products with
-    global rotations enlarge an error in every sweep: such a drift is no rounding any more.
+    roundings of single sweeps add up over all sweeps, at worst with equal signs. Reversed products
+    with global rotations enlarge an error in every sweep: such a drift is no rounding any more.
     """
     return min(joints * sweeps * rotations(epsilon, joints), LARGEST_DRIFT)
 

@@ -1,7 +1,7 @@
 """Compare single sweeps with the textbook's: the method of a solver, and whether it is right.
 
-Sweeps reveal faults that whole solves hide: six of the wrong CCDs that were found in real programs
-still reach 999 of 1,000 targets.
+Sweeps reveal faults behind whole solves: six wrong CCDs of real programs still reach 999 of 1,000
+targets.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ MIN_SHARE = 0.5
 # A rotation smaller than this share of CCD's, or angle [rad], may be rounding and not damping.
 SMALLEST = 1e-3
 LAW = "one sweep"
-# The most sweeps that answers may have in the place of those that are asked for.
+# The largest number of sweeps of answers in place of the requested sweeps.
 MOST_SWEEPS = 30
 # Quaternions whose numbers differ by less are alike, in single precision too.
 ROUNDED = 1e-6
@@ -48,7 +48,7 @@ class PoseTrial:
 
     @property
     def is_wrong(self) -> bool:
-        """Whether there is no pose, or one that breaks a law."""
+        """Whether there is no pose, or a pose against a law."""
         findings = self.judgement.findings
         is_law = any(f.verdict >= Verdict.WRONG and f.law != "claims" for f in findings)
         return is_law or self.judgement.verdict is Verdict.BROKEN
@@ -272,7 +272,7 @@ def _explains(
 def other_count(
     comparison: SweepComparison, trials: Sequence[PoseTrial], greeting: Greeting
 ) -> Sentence | None:
-    """Return that wrong answers are those of another number of sweeps, None if they are not."""
+    """Return the sentence on wrong answers of another number of sweeps, else None."""
     if not comparison.wrong or not comparison.method:
         return None
     for count in range(1, MOST_SWEEPS + 1):

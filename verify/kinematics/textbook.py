@@ -1,7 +1,7 @@
 """CCD and FABRIK as textbooks have them, with the choices of honest programs.
 
-The solvers keep the local rotations of the whole skeleton and place all joints anew after each
-rotation, as a student's program does, not the reference's chain of global rotations. In CCD, d is
+The solvers keep the local rotations of the whole skeleton, not the reference's chain of global
+rotations. All joints are placed anew after each rotation, like in a student's program. In CCD, d is
 the world rotation of a joint, R its global and Q its local rotation, P its parent's global one.
 """
 
@@ -92,7 +92,7 @@ def solve(
 def sweep_ccd(
     chain: TextbookChain, target: Any, i: int, choices: Choices, pose: TextbookPose
 ) -> None:
-    """Rotate each joint from the effector's parent to the root; or only one of them, the i-th."""
+    """Rotate each joint from the effector's parent to the root; or only the i-th of these."""
     links = len(chain.path) - 1
     if choices.sweep_of_a_joint:
         rotate_joint(chain, links - 1 - i % links, target, choices, pose)
@@ -153,7 +153,7 @@ def sweep_fabrik(
 
 
 def pull(chain: TextbookChain, k: int, moved: int, fixed: int, x: FloatArray) -> None:
-    """Move one joint of link k on the line to the other until they are the link's length apart."""
+    """Move a joint of link k on the line to the other joint, to the link's length."""
     start = load_vector(x, fixed)
     direction = subtract(load_vector(x, moved), start)
     distance = norm(direction)

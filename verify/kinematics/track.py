@@ -33,8 +33,8 @@ TASK = "track"
 SLOW = 1e-2
 CONTINUES = "each frame from the one before"
 FRAMES, TOLERANCE, SWEEPS = 8, 1e-4, 60
-# A joint that moves farther than this between neighbouring frames has jumped: on these curves the
-# textbook's CCD and FABRIK, each frame from the one before, move no joint half as far [m].
+# A joint has jumped by a larger distance than this between neighbouring frames [m]. On these curves
+# the textbook's CCD and FABRIK, each frame from the frame before, move no joint half as far.
 JUMP = 1.0
 
 

@@ -20,15 +20,15 @@ from .robot_models import ancestors, mechanism, tool_pose, twists_between
 from .robot_motions import ITERATIONS
 from .robot_targets import LIMIT_STEP
 
-# A frame is a jump if the joints move so many times as far as the reference has to from the same
-# frame, and this much farther [rad]: solvers that weight joints, or move in the null space, may.
-# Beyond reach the arm is singular, and an honest arm may turn about itself.
+# A frame is a jump if the joints move so many times as far as the reference from the same frame,
+# and this much farther [rad]. Weighted joints and motions in the null space stay below. Beyond
+# reach the arm is singular, and an honest arm may turn about itself.
 JUMP_FACTOR, JUMP_MARGIN, MARGIN_BEYOND_REACH = 5.0, 1.0, 5.0
 # Answers of a faulty solver may stop so many times as far off as its tolerance: it has its own.
 LENIENT = 10.0
-# Joints that hold the same limit so closely are at it [rad].
+# Joints so close to a limit are at this limit [rad].
 AT_LIMIT = 1e-6
-# Newton iterations of joints that leave their limits; joints that are enough for any target.
+# Newton iterations of joints beyond their limits; joints enough for any target.
 RELEASES, ENOUGH_JOINTS = 10, 6
 # Joints that a solver has clamped leave their limits so far [rad, m]: what is left of slow
 # iterations is less.
@@ -94,7 +94,7 @@ class Trajectory:
 
     @property
     def is_missed(self) -> BoolArray:
-        """Whether the tool is off a target that it can reach, (frame)."""
+        """Whether the tool is off a reachable target, (frame)."""
         return np.asarray(self.is_off_target & self.case.facts["reachable"])
 
     @cached_property
@@ -170,9 +170,9 @@ def is_falling_at(motion: Trajectory) -> bool:
 
 
 def limit_laws(motion: Trajectory, motions: Iterable[Trajectory]) -> Iterator[Finding]:
-    """Yield whether a single iteration from a joint's limit moves the joints that it should.
+    """Yield whether a single iteration from a joint's limit moves the due joints.
 
-    The joint has to stay in all motions: in one it may be clamped by chance.
+    The joint has to stay in all motions: a single clamp may be by chance.
     """
     facts = motion.case.facts
     if motion.case.family != LIMIT_STEP or is_still(motion).all():
@@ -195,14 +195,14 @@ def is_still(motion: Trajectory) -> BoolArray:
 REDUCED = 0.9
 
 
-# Coordinates that are at a limit are so near to it [rad, m]; speeds agree to this share.
+# Coordinates at a limit are so near to the limit [rad, m]; speeds agree to this share.
 EXACT, SAME_SPEED = 1e-9, 1e-3
 
 
 def is_at_minimum(motion: Trajectory) -> BoolArray:
     """Return whether no joint off its limits would reduce the error, (frame).
 
-    Solvers weigh rotations as they like: some weight may make it the least.
+    Solvers choose weights of rotations: some weight may make this residual the least.
     """
     e, J = motion.twists(motion.q), jacobian(mechanism(motion.inputs), motion.q, -1)
     J = J * ~motion.at_limits[:, None, :]
