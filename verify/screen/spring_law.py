@@ -1,4 +1,4 @@
-"""What springs pull at each length, drawn in letters beside the linear law."""
+"""The pull of springs at each length, drawn in letters beside the linear law."""
 
 import numpy as np
 
@@ -8,12 +8,12 @@ from ..observe.spring_law import SpringLaw
 
 # The size of the drawing on a terminal.
 COLUMNS, ROWS = 48, 9
-# The marks of a measured pull, of the linear law, and of both at one place.
-MEASURED, LINEAR, BOTH = "o", ".", "8"
+# The marks of a measured pull, of the linear law, and of both in the same place.
+MEASURED, LINEAR, OVERLAP = "o", ".", "8"
 
 
 def caption(law: SpringLaw) -> Sentence:
-    """Return what the drawing in letters shows."""
+    """Return the caption of the drawing in letters."""
     return sentence(
         "Your springs (o) beside right ones (.), for l/r from {first:.2f} to {last:.2f}:",
         first=law.stretches[0], last=law.stretches[-1],
@@ -35,5 +35,5 @@ def rows(law: SpringLaw) -> list[str]:
     )
     grid[linear, np.arange(COLUMNS)] = LINEAR
     for row, column in zip(measured, columns, strict=True):
-        grid[row, column] = MEASURED if grid[row, column] in (" ", MEASURED) else BOTH
+        grid[row, column] = MEASURED if grid[row, column] in (" ", MEASURED) else OVERLAP
     return ["|" + "".join(row).rstrip() for row in grid]
