@@ -7,7 +7,7 @@ import pytest
 
 from plumbob.verify.dictionary import look_up as module
 from plumbob.verify.dictionary.build import digest
-from plumbob.verify.dictionary.entry import Dictionary, Entry, file_of, merged, read
+from plumbob.verify.dictionary.entry import ChangePair, file_of, merged, read
 from plumbob.verify.dictionary.look_up import UNSTEADY, look_up
 from plumbob.verify.dictionary.requests import (
     ENERGY,
@@ -15,6 +15,7 @@ from plumbob.verify.dictionary.requests import (
     FORCES,
     IK,
     OUTPUTS,
+    STEP,
     TASKS,
     is_solve,
     keys,
@@ -30,9 +31,9 @@ from plumbob.verify.fault_programs import (
     source_of,
 )
 from plumbob.verify.functions import FunctionConnection
-from plumbob.verify.greeting import PROTOCOL, Greeting, System
+from plumbob.verify.greeting import PROTOCOL, Fixed, Greeting, System
 from plumbob.verify.judgement import Verdict
-from plumbob.verify.one_line import search
+from plumbob.verify.one_line import candidates, search
 from plumbob.verify.one_line.mutants import Program
 from plumbob.verify.one_line.right_programs import answer_of
 from plumbob.verify.one_line.search import with_changed_line
@@ -76,15 +77,6 @@ def test_a_dictionary_is_of_the_programs_as_they_are(task, method):
 
 def test_dictionaries_are_small():
     assert sum(file_of(*key).stat().st_size for key in TASKS) <= 3_000_000
-
-
-def test_a_file_holds_what_was_written(tmp_path):
-    entries = [Entry("ccd", ("PB-CCD-001",)), Entry("ccd", (), "sign", "f", "a", "-a", "text", 3)]
-    written = Dictionary("0", entries, np.array([[[0.5, np.nan]], [[1e-3, 2.0]]]))
-    written.write(tmp_path / "x")
-    digest_, *_ = dictionary = read(tmp_path / "x")
-    assert (digest_, dictionary.entries) == ("0", entries)
-    np.testing.assert_allclose(dictionary.keys, written.keys, rtol=1e-7)
 
 
 class Solver(FunctionConnection):
@@ -227,11 +219,6 @@ def test_cases_decide_what_is_named(factor):
     assert bool(explained) is (factor == 1.0)
 
 
-def test_a_changed_line_says_how_many_are_equal():
-    counts = [entry.equal_count for entry in dictionary_of(FK, "").entries]
-    assert max(counts) > 1
-
-
 def test_two_changes_at_once_keep_the_lines_of_both():
     right = "a = 1\nb = 2\nc = 3"
     assert merged(right, "a = 0\nb = 2\nc = 3", "a = 1\nb = 2\nc = 4") == "a = 0\nb = 2\nc = 4"
@@ -239,21 +226,99 @@ def test_two_changes_at_once_keep_the_lines_of_both():
         merged(right, "a = 0\nb = 2\nc = 3", "a = 5\nb = 2\nc = 3")
 
 
-def test_two_mistakes_of_forces_are_named_together():
-    codes = "PB-FORCE-005", "PB-FORCE-019"  # gravity upwards, and springs that push
-    source = coded_faults()[codes[0]].wrong_program
-    source = coded_faults()[codes[1]].planted_in(source)
-    connection = connection_to(source)
+SPRING, PULL = "k * (length - rest)", "pull = (k * (length - rest) + c * rate) * u"
+GRAVITY = "masses[:, None] * gravity"
+
+
+def planted(program, *changes):
+    """Return the connection to a right program with other texts."""
+    source = source_of(program)
+    for right, wrong in changes:
+        assert source.count(right) == 1
+        source = source.replace(right, wrong)
+    return connection_to(source)
+
+
+@pytest.mark.sample("half")
+@pytest.mark.parametrize(
+    ("changes", "codes"),
+    [
+        pytest.param([(SPRING, f"0.5 * {SPRING}"), (GRAVITY, "masses[:, None] * [0, -9.81, 0]")],
+                     {"PB-FORCE-011", "PB-FORCE-003"}, id="half, constant"),
+        pytest.param([(SPRING, "k * (length + rest)"), (GRAVITY, f"0.0 * {GRAVITY}")],
+                     {"PB-LINE-005", "PB-FORCE-004"}, id="reversed, missing"),
+        pytest.param([(PULL, "pull = (0.5 * k * (length - rest) - c * rate) * u")],
+                     {"PB-FORCE-011", "PB-FORCE-030"}, id="in one line"),
+    ],
+)  # fmt: skip
+def test_two_mistakes_of_forces_are_named_together(changes, codes):
+    connection = planted("forces", *changes)
     cases = DISCIPLINES[FORCES].cases(connection.greeting, "", 0, False)
     report = judge_cases(connection, FORCES, "", cases)
     report = with_changed_line(report, connection.greeting, connection)
     assert report.verdict is Verdict.WRONG
-    assert {*report.diagnosis.explanations[0].codes} == {*codes}
+    assert {*report.diagnosis.explanations[0].codes} == codes
 
 
-@pytest.mark.parametrize("task", [FORCES, ENERGY])
-def test_requests_of_springs_go_to_solvers_of_all_numbers(task):
-    (case, *_) = requests(task, "")
-    assert suitable(case, Greeting(PROTOCOL, (task,)))
+def test_keys_of_mistakes_in_two_terms_add_up():
+    rng = np.random.default_rng(0)
+    changes = rng.standard_normal((30, 6))
+    assert list(module._summands(changes, changes[7] + changes[21], 1e-6)) == [(7, 21)]
+    assert list(module._summands(changes, changes[7] + 1.1 * changes[21], 1e-6)) == []
+
+
+@pytest.mark.parametrize("task", [FORCES, ENERGY, STEP])
+def test_restricted_systems_get_plain_requests(task):
+    def names(**restriction):
+        greeting = Greeting(PROTOCOL, (task,), **restriction)
+        return {case.name for case in requests(task, "") if suitable(case, greeting)}
+
+    everything, plain = names(), {case.name for case in requests(task, "")[-1:]}
     for system in (System(masses="one"), System(gravity="number"), System(rest_lengths="measured")):
-        assert not suitable(case, Greeting(PROTOCOL, (task,), system=system))
+        assert plain <= names(system=system) < everything
+    assert plain <= names(planar=True) < everything
+    assert names(fixed=Fixed(gravity=(0.0, -1.0, 0.0))) == names(system=System(continues=True))
+
+
+def step_proposals(program, *changes, system=None):
+    connection = planted(program, *changes)
+    greeting = connection.greeting
+    if system is not None:
+        greeting = Greeting(PROTOCOL, (STEP,), system=system)
+    return look_up(connection, STEP, "", greeting)
+
+
+@pytest.mark.sample("substeps", "Verlet step")
+@pytest.mark.parametrize("program", IN_DICTIONARY[STEP])
+def test_right_steps_are_like_no_entry(program):
+    result = step_proposals(program)
+    assert (list(result.entries), result.is_wrong) == ([], False)
+
+
+HEAVY = ("a[i] += gravity", "a[i] += gravity / masses[i]")
+
+
+@pytest.mark.sample("one mass", "local-global")
+@pytest.mark.parametrize(
+    ("program", "changes", "system", "texts"),
+    [
+        pytest.param("Verlet step", [HEAVY], None, {"PB-FORCE-001"}, id="a = g / m"),
+        pytest.param("Verlet step", [HEAVY], System(masses="one", stiffnesses="one"),
+                     {"PB-FORCE-001"}, id="one mass"),
+        pytest.param("local-global step", [("        b -= A[:, pinned] @ x[pinned]\n", ""),
+                                           ('"y", 10, "', '"y", 30, "')],
+                     None, {"PB-STEP-040"}, id="local-global"),
+        pytest.param("newton step", [('/ h}', '/ h * 0.9}')], None, set(), id="velocities alone"),
+    ],
+)  # fmt: skip
+def test_wrong_steps_are_looked_up_in_the_choices_of_their_solver(program, changes, system, texts):
+    codes = {code for e in step_proposals(program, *changes, system=system).entries
+             for part in candidates.parts_of(e) for code in part.codes}  # fmt: skip
+    assert texts <= codes
+
+
+def test_two_mistakes_of_a_step_are_proposed_together():
+    right = "(length - rest_lengths[s]) * u"
+    changes = (right, right.replace("-", "+")), ("velocities[j] - ", "velocities[j] + ")
+    first, *_ = step_proposals("Verlet step", *changes).entries
+    assert isinstance(first, ChangePair)

@@ -10,6 +10,7 @@ from plumbob.verify.greeting import Greeting, Step
 from plumbob.verify.judgement import CaseJudgement, Diagnosis, Finding, TaskReport, Verdict
 from plumbob.verify.kinematics import problems
 from plumbob.verify.one_line import answers, search
+from plumbob.verify.one_line.candidates import Evidence
 from plumbob.verify.one_line.right_programs import programs_of
 
 TASK, METHOD = "inverse_kinematics", "jacobian"
@@ -80,9 +81,9 @@ def explained(report):
 @pytest.mark.parametrize("name", HONEST)
 def test_a_right_program_gives_honest_steps_of_other_constants(name):
     report = report_of(HONEST[name], 6)
-    compared = answers.compared_answers(report, [])
+    evidence = Evidence(report, answers.compared_answers(report, []), 1e-7)
     programs = [p for p in programs_of(TASK, METHOD, Step()) if "within" not in p.names]
-    assert any(search._gives(program, report, compared, 1e-7) for program in programs)
+    assert any(search._gives(program, evidence) for program in programs)
 
 
 @pytest.mark.sample("bounded")

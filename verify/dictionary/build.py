@@ -17,16 +17,19 @@ from ..fault_programs import IN_DICTIONARY, changes_of, source_of
 from ..one_line.mutants import ENTRIES, Program
 from ..one_line.right_programs import answer_of, faults_in
 from .entry import Dictionary, Entry, likelihood
-from .requests import FK, LARGEST, OUTPUTS, fractions, is_solve, keys, requests
+from .requests import FK, LARGEST, OUTPUTS, STEP, fractions, is_solve, keys, requests
+from .rights import right_keys
 
 # Differences of keys above this tell answers apart, the shortest distance of a look-up.
 DISTINCT = 1e-6
-# A change is left out if its keys move by more than the second number when inputs move by the
-# first, relative. Rounding would decide its answers.
+# A change whose keys move by more than the second number when inputs move by the first, relative,
+# is left out: rounding would decide what it answers.
 NUDGE, MOVED = 1e-14, 1e-9
-# The largest number of entries with equal keys, the likeliest entries.
+# The most entries with equal keys that are kept, the likeliest ones.
 EQUAL = 3
-# The functions whose changes are tried in each program, with other effects on other forms.
+# The functions whose changes are tried in each program: they do other things to other forms.
+# Programs of these have conventions or choices of their own: all functions are changed in each.
+ALL_FUNCTIONS = (FK, STEP)
 IN_FORMS = {"conjugate", "cross", "product", "product_of_vectors", "by_cross", "by_product"}
 
 
@@ -40,24 +43,49 @@ def digest(task: str, method: str) -> str:
     return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
 
 
+# The likeliest changes with equal keys, by these keys as bytes.
+Classes = dict[bytes, list[tuple[Entry, FloatArray]]]
+
+
+def program_groups(task: str, method: str) -> list[Sequence[str]]:
+    """Return the names of a dictionary's programs in parts that can be computed beside each other.
+
+    Programs that share functions, which are changed once, are in one part.
+    """
+    names = IN_DICTIONARY[method or task]
+    return [[name] for name in names] if task in ALL_FUNCTIONS else [names]
+
+
 @np.errstate(all="ignore")  # changed programs divide by zero
-def build(task: str, method: str, notify: Callable[[str], None] = lambda text: None) -> Dictionary:
-    """Return the dictionary of a task and a method."""
-    cases, names = requests(task, method), IN_DICTIONARY[method or task]
-    base = Program(source_of(names[0]))
+def classes_of(
+    task: str, method: str, names: Sequence[str], notify: Callable[[str], None] = lambda text: None
+) -> Classes:
+    """Return the changes of some programs."""
+    cases, base = requests(task, method), Program(source_of(IN_DICTIONARY[method or task][0]))
     right = [answer_of(base, method, case) for case in cases]
-    classes, functions = dict[bytes, list[tuple[Entry, FloatArray]]](), set[str]()
+    own = [keys for rows in right_keys(task, method).values() for keys in rows]
+    classes, functions = Classes(), set[str]()
     for name in names:
         program = Program(source_of(name))
-        own = _row(partial(answer_of, program, method), cases, right)  # of another right choice
         for entry, run in _changes(name, program, cases, method, functions):
             row = _row(run, cases, right, entry.function in ("", *ENTRIES))
-            if row is None or (own is not None and np.allclose(row, own, 0.0, DISTINCT)):
+            if row is None or any(_is_equal(row, keys) for keys in own):
                 continue
             key = (np.round(row / DISTINCT) + 0.0).tobytes()
             if key in classes or _is_stable(run, cases, right, row):
                 _add(classes.setdefault(key, []), entry, row, program)
         notify(f"{name}: {len(classes)} answers")
+    return classes
+
+
+def joined(task: str, method: str, parts: Sequence[Classes]) -> Dictionary:
+    """Return the dictionary of a task and a method."""
+    classes = Classes()
+    for key, equal in (item for part in parts for item in part.items()):
+        others = classes.get(key, [])
+        count = sum(pairs[0][0].equal_count for pairs in (equal, others) if pairs)
+        pairs = sorted([*others, *equal], key=lambda pair: likelihood(pair[0]))[:EQUAL]
+        classes[key] = [(entry._replace(equal_count=count), row) for entry, row in pairs]
     rows = sorted(
         (pair for equal in classes.values() for pair in equal),
         key=lambda pair: tuple(np.nan_to_num(pair[1].ravel(), nan=LARGEST)),
@@ -69,7 +97,7 @@ def build(task: str, method: str, notify: Callable[[str], None] = lambda text: N
 def _add(
     equal: list[tuple[Entry, FloatArray]], entry: Entry, row: FloatArray, program: Program
 ) -> None:
-    """Add a change of a program to changes with equal answers; the likeliest remain."""
+    """Add a change of a program to those that answer alike, the likeliest of which remain."""
     count = (equal[0][0].equal_count if equal else 0) + (len(entry.codes) < 2)
     is_likely = len(equal) < EQUAL or likelihood(entry) < likelihood(equal[-1][0])
     if is_likely and all(entry[:6] != other[:6] for other, _ in equal):
@@ -86,7 +114,7 @@ Run = Callable[[Case], Mapping[str, Any]]
 def _changes(
     name: str, program: Program, cases: Sequence[Case], method: str, functions: set[str]
 ) -> Iterator[tuple[Entry, Run]]:
-    """Yield the changes of a program with their answers, each while in place."""
+    """Yield the changes of a program with their answers: while it has them, and no longer."""
     passes, answer = {}, partial(answer_of, program, method)
     for case in cases:
         _, passes[case.name] = program.count_passes(partial(answer, case))
@@ -100,7 +128,7 @@ def _changes(
         entry = Entry(name, (), change.kind, change.function, change.right, change.wrong, text)
         yield entry, partial(_within, wrong, passes, method)
     program.observe(lambda: [answer(case) for case in cases if not is_solve(case)])
-    if cases[0].task == FK:  # each program has conventions of its own
+    if cases[0].task in ALL_FUNCTIONS:
         functions.clear()
     functions -= {program.text_of(f) for f in IN_FORMS & program.names.keys()}
     for mutant in program.mutants(functions):
@@ -113,7 +141,7 @@ def _changes(
 
 
 def _codes(name: str, task: str, method: str) -> Iterator[tuple[str, ...]]:
-    """Yield the known faults of a program; of the first program also two at once."""
+    """Yield the known faults of a program; of the first one also two at once."""
     codes = [fault.code for fault in faults_in(source_of(name), task, method)]
     yield from ((code,) for code in codes)
     if name == IN_DICTIONARY[method or task][0]:
@@ -141,6 +169,11 @@ def _row(
         with suppress(Exception):  # of a changed program any may come
             row[i] = keys(run(case), right[i], case)
     return row if _is_wrong(row) else None
+
+
+def _is_equal(row: FloatArray, right: FloatArray) -> bool:
+    """Return whether keys are those of a right program, as far as there are any."""
+    return bool(np.nanmax(np.abs(row - right), initial=0.0) <= DISTINCT)
 
 
 def _is_wrong(row: FloatArray) -> bool:

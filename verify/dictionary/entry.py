@@ -2,6 +2,7 @@
 
 import json
 import lzma
+from collections.abc import Mapping
 from difflib import SequenceMatcher
 from itertools import pairwise
 from pathlib import Path
@@ -16,6 +17,7 @@ from ..one_line.mutants import Program
 from ..one_line.right_programs import KINDS
 
 FOLDER = Path(__file__).parent
+NO_CHOICES: Mapping[str, Any] = {}
 
 
 class Entry(NamedTuple):
@@ -30,10 +32,11 @@ class Entry(NamedTuple):
     text: str = ""  # the changed function
     equal_count: int = 1  # of the changed lines that answer alike
 
-    def changed_program(self) -> Program:
-        """Return the program with the change; raise ValueError or SyntaxError without a place.
+    def changed_program(self, choices: Mapping[str, Any] = NO_CHOICES) -> Program:
+        """Return the program with the change; raise ValueError or SyntaxError if it has no place.
 
-        The function has the passes of `Program` in its loops, from which it was written.
+        The function has the passes of `Program` in its loops: it was written by one. Constants of
+        the program may be chosen.
         """
         source, faults = source_of(self.program), coded_faults()
         for code in self.codes:
@@ -41,12 +44,13 @@ class Entry(NamedTuple):
                 raise ValueError(f"{code}: expected a known fault: is the dictionary out of date?")
             source = faults[code].planted_in(source)
         program = Program(source)
+        program.choose(choices)
         if self.text:
             exec(compile(self.text, self.program, "exec"), program.names)
         return program
 
     def texts(self) -> dict[str, str]:
-        """Return the changed functions by their names."""
+        """Return the functions that the change has made, by their names."""
         if self.text:
             return {self.function: self.text}
         right = Program(source_of(self.program)).texts
@@ -59,9 +63,10 @@ class ChangePair(NamedTuple):
     first: Entry
     second: Entry
 
-    def changed_program(self) -> Program:
-        """Return the program with both changes; raise ValueError of a shared line."""
+    def changed_program(self, choices: Mapping[str, Any] = NO_CHOICES) -> Program:
+        """Return the program with both changes; raise ValueError if they share a line."""
         program = Program(source_of(self.first.program))
+        program.choose(choices)
         right, texts = program.texts, self.first.texts()
         for name, text in self.second.texts().items():
             texts[name] = merged(right[name], texts[name], text) if name in texts else text
@@ -71,7 +76,7 @@ class ChangePair(NamedTuple):
 
 
 def merged(right: str, first: str, second: str) -> str:
-    """Return a text with the changed lines of two texts; raise ValueError of a shared line."""
+    """Return a text with the lines that two others change; raise ValueError if they share one."""
     lines, changes = right.splitlines(), list[tuple[int, int, list[str]]]()
     for text in (first, second):
         new = text.splitlines()
@@ -110,7 +115,7 @@ class Dictionary(NamedTuple):
 
 
 def _planes(keys: Any) -> bytes:
-    """Return the bytes of numbers, all first bytes before all second bytes, to compress well."""
+    """Return the bytes of numbers, all first bytes, then all second ones: they compress better."""
     return np.ascontiguousarray(keys.reshape(-1, 1).view("u1").T).tobytes()
 
 

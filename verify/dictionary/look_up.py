@@ -1,11 +1,11 @@
-"""Look up the changes of right programs with a solver's answers to a few requests."""
+"""Look up the changes of right programs that answer a few requests as a solver does."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference.arguments import BoolArray, FloatArray
 from plumbob.text.sentence import Sentence, sentence
 
 from ..case import Case
@@ -16,16 +16,30 @@ from ..greeting import Greeting
 from ..one_line.mutants import Program
 from ..one_line.right_programs import answer_of, comparable
 from .constant_sweeps import known_fault, makes_constant_sweeps
-from .entry import Dictionary, Entry, file_of, likelihood, read
-from .requests import FK, IK, OUTPUTS, TASKS, is_solve, keys, requests, suitable
+from .entry import ChangePair, Dictionary, Entry, file_of, likelihood, read
+from .requests import (
+    FK,
+    IK,
+    OF_SPRINGS,
+    OUTPUTS,
+    STEP,
+    TASKS,
+    fitted_to,
+    fractions,
+    is_solve,
+    keys,
+    requests,
+    suitable,
+)
+from .rights import right_keys
 
-# Keys differ by ten times the rounding of an answer. Single precision loses three digits more, and
-# a fourth where a mistake enlarges rounding; the fourth is tried where nothing is nearer.
+# Keys differ by ten times the rounding of an answer: single precision loses three digits more, and
+# a fourth where a mistake enlarges rounding, which is tried where nothing is nearer.
 TOLERANCES = {"double": (1e-6,), "single": (1e-4, 1e-3)}
-# Answers to equal requests differ by less, except by threads with another order of sums.
+# Equal requests get answers that differ by less, but for threads that add up in another order.
 SAME = 1e-6
-# The most candidates, which all cases have to decide between.
-MAX_CANDIDATES = 200
+# The most candidates, which all cases have to decide between, and the most pairs of changes.
+MAX_CANDIDATES, MAX_PAIRS = 200, 40
 UNSTEADY = sentence(
     "Equal requests got different answers, also after a new start: no changed line is looked up."
 )
@@ -34,15 +48,17 @@ UNSTEADY = sentence(
 class Proposals(NamedTuple):
     """What a look-up proposes."""
 
-    entries: Sequence[Entry] = ()  # the likeliest first
+    entries: Sequence[Entry | ChangePair] = ()  # the likeliest first
     sweeps: int | None = None  # that are made whatever is asked
     is_wrong: bool = True  # whether the solver answers a request otherwise than right programs
-    of_positions: bool = False  # whether positions alone are alike: rotations of no matrix are any
+    # whether positions alone are alike: rotations of no matrix are any, and velocities of steps may
+    # have a second mistake
+    of_positions: bool = False
     hint: Sentence | None = None  # why nothing is looked up, or that no file can be read
 
 
 def look_up(connection: Connection, task: str, method: str, greeting: Greeting) -> Proposals | None:
-    """Return the changes with the answers of a new process of a solver, None without a dictionary.
+    """Return the changes that a new process of a solver answers like, None without a dictionary.
 
     Each request is looked up alone as well: a second mistake may hide the first in another.
     """
@@ -57,7 +73,8 @@ def look_up(connection: Connection, task: str, method: str, greeting: Greeting) 
         except (OSError, ValueError):
             return Proposals(hint=_unreadable(file_of(task, own).name))
     connection.close()
-    first, second = ([connection.answer(case) for case in cases] for _ in range(2))
+    sent = [fitted_to(case, greeting) for case in cases]
+    first, second = ([connection.answer(case) for case in sent] for _ in range(2))
     if not all(map(_is_same, first, second)):
         return Proposals(hint=UNSTEADY)
     tolerance, *_ = TOLERANCES[greeting.precision]
@@ -68,26 +85,46 @@ def look_up(connection: Connection, task: str, method: str, greeting: Greeting) 
         if known[1] != 1:  # which solves show better
             return Proposals(*known)
     tables = [_table(dictionaries[own], task, own, cases, first) for own in methods]
-    is_wrong = any(np.nanmax(np.abs(rows), initial=0.0) > tolerance for _, rows, _ in tables)
+    is_wrong = any(table.wrong_requests(tolerance).any() for table in tables)
     for bound in TOLERANCES[greeting.precision]:
         if entries := _candidates(tables, bound):
             return Proposals(entries, is_wrong=is_wrong)
-    if task == FK:
-        positions = [(dictionary, rows[:, :1], solves) for dictionary, rows, solves in tables]
-        return Proposals(_candidates(positions, tolerance), is_wrong=is_wrong, of_positions=True)
+    if task in (FK, STEP):
+        positions = [table.of_first_outputs(1) for table in tables]
+        entries = _candidates(positions, tolerance)
+        return Proposals(entries, is_wrong=is_wrong, of_positions=task == FK or bool(entries))
     return Proposals(is_wrong=is_wrong)
 
 
 def _dictionary(task: str, method: str) -> Dictionary:
-    """Return the dictionary of a task and a method; raise ValueError of other requests."""
+    """Return the dictionary of a task and a method; raise ValueError if it is of other requests."""
     dictionary, count = read(file_of(task, method)), len(requests(task, method))
     if dictionary.keys.shape[1] != count:
         raise ValueError(f"expected keys of {count} requests, got {dictionary.keys.shape[1]}")
     return dictionary
 
 
-# A dictionary, the keys of a solver's answers (request, output), and which requests are solves.
-Table = tuple[Dictionary, FloatArray, list[bool]]
+class Table(NamedTuple):
+    """A dictionary, and the keys of a solver's answers."""
+
+    dictionary: Dictionary
+    rows: FloatArray  # (request, output)
+    is_solve: Sequence[bool]  # which requests are solves
+    rights: Mapping[str, Sequence[FloatArray]]  # the keys of right programs
+    output_count: int  # of the first outputs, which are compared
+    is_additive: bool  # whether mistakes in two terms change an answer by a sum
+
+    def of_first_outputs(self, count: int) -> "Table":
+        """Return the table of the first outputs alone."""
+        return self._replace(rows=self.rows[:, :count], output_count=count)
+
+    def wrong_requests(self, tolerance: float) -> BoolArray:
+        """Return which requests are answered as no right program answers them."""
+        rights = np.array([row for rows in self.rights.values() for row in rows])
+        with np.errstate(invalid="ignore"):
+            gaps = np.abs(self.rows - rights[:, :, : self.output_count])
+            is_other = gaps > tolerance * np.maximum(1.0, np.abs(self.rows))
+        return np.asarray(is_other.any(axis=2).all(axis=0))
 
 
 def _table(
@@ -97,20 +134,26 @@ def _table(
     cases: Sequence[Case],
     answers: Sequence[Answer | Failure],
 ) -> Table:
-    """Return the keys of a solver's answers, NaN of unsent requests."""
+    """Return the keys of a solver's answers, NaN of requests that are not sent."""
     base, all_cases = Program(source_of(IN_DICTIONARY[method or task][0])), requests(task, method)
     names = [case.name for case in all_cases]
     rows = np.full((len(names), len(OUTPUTS[task])), np.nan)
     for case, answer in zip(cases, answers, strict=True):
         rows[names.index(case.name)] = _keys_of(answer, case, base, method)
-    return dictionary, rows, list(map(is_solve, all_cases))
+    solves = list(map(is_solve, all_cases))
+    return Table(
+        dictionary, rows, solves, right_keys(task, method), len(OUTPUTS[task]), task in OF_SPRINGS
+    )
 
 
-def _candidates(tables: Sequence[Table], tolerance: float) -> list[Entry]:
-    """Return the likeliest entries with the keys of rows."""
-    ranks = [pair for table in tables for pair in _matches(*table, tolerance)]
+def _candidates(tables: Sequence[Table], tolerance: float) -> list[Entry | ChangePair]:
+    """Return the likeliest of the entries that match rows of keys, and sums of two if none does."""
+    ranks = [pair for table in tables for pair in _matches(table, tolerance)]
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
-    return [entry for _, entry in ranks[:MAX_CANDIDATES]]
+    entries: list[Entry | ChangePair] = [entry for _, entry in ranks[:MAX_CANDIDATES]]
+    if any(not rank for rank, _ in ranks):
+        return entries
+    return [*(pair for table in tables for pair in two_changes(table, tolerance)), *entries]
 
 
 def _unreadable(file: str) -> Sentence:
@@ -137,21 +180,61 @@ def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -
     return keys(outputs.values, answer_of(base, method, case), case)
 
 
-def _matches(
-    dictionary: Dictionary, rows: FloatArray, is_solve: Sequence[bool], tolerance: float
-) -> list[tuple[int, Entry]]:
-    """Return the entries with the keys of all answered requests, or (1) of a single wrong answer.
+def _matches(table: Table, tolerance: float) -> list[tuple[int, Entry]]:
+    """Return the entries with the keys of all answered requests, or (1) of a single wrong one.
 
-    The rows have the keys of all outputs or of the first outputs. An entry with wrong single sweeps
-    has no keys of solves.
+    An entry with wrong single sweeps has no keys of solves.
     """
-    keys = dictionary.keys[:, :, : rows.shape[1]]
-    answered = np.isfinite(rows)
+    entries, rows = table.dictionary.entries, table.rows
+    keys = table.dictionary.keys[:, :, : table.output_count]
     with np.errstate(invalid="ignore"):
         gaps = np.abs(keys - rows) <= tolerance * np.maximum(1.0, np.abs(rows))
-        is_wrong = np.any(np.abs(rows) > tolerance, axis=1)
-    is_alike = np.all(gaps | ~answered, axis=2)
-    is_unknown = np.all(np.isnan(keys), axis=2) & is_solve
+    is_alike = np.all(gaps | ~np.isfinite(rows), axis=2)
+    is_wrong = table.wrong_requests(tolerance)
+    is_unknown = np.all(np.isnan(keys), axis=2) & table.is_solve
     every, single = np.all(is_alike | is_unknown, axis=1), np.any(is_alike & is_wrong, axis=1)
     numbers = np.flatnonzero((every | single) & is_wrong.any())
-    return [(int(not every[i]), dictionary.entries[i]) for i in numbers]
+    return [(int(not every[i]), entries[i]) for i in numbers]
+
+
+def two_changes(table: Table, tolerance: float) -> list[ChangePair]:
+    """Return the two changes of a program, the likeliest first, that together have all keys.
+
+    Terms of forces add up, and so do keys of mistakes in different terms: what both change is the
+    sum of what each changes.
+    """
+    if not (table.is_additive and table.wrong_requests(tolerance).any()):
+        return []
+    pairs = list[ChangePair]()
+    programs = np.array([entry.program for entry in table.dictionary.entries])
+    is_answered = np.isfinite(table.rows)
+    goal = table.rows[is_answered]
+    for name, rights in table.rights.items():
+        numbers = np.flatnonzero(programs == name)
+        changes = table.dictionary.keys[numbers][:, :, : table.output_count][:, is_answered]
+        right = rights[0][:, : table.output_count][is_answered]
+        is_finite = np.isfinite(changes).all(axis=1)
+        numbers, changes = numbers[is_finite], changes[is_finite] - right
+        for i, j in _summands(changes, goal - right, tolerance):
+            first, second = (table.dictionary.entries[numbers[k]] for k in (i, j))
+            if max(len(first.codes), len(second.codes)) < 2:  # two codes are two mistakes
+                pairs.append(ChangePair(first, second))
+    pairs.sort(key=lambda pair: sorted(map(likelihood, pair)))
+    return pairs[:MAX_PAIRS]
+
+
+def _summands(changes: FloatArray, goal: FloatArray, tolerance: float) -> Iterator[tuple[int, int]]:
+    """Yield the numbers i < j of rows whose sum is a goal."""
+    if not len(goal) or not len(changes):
+        return
+    weights = fractions(len(goal), 6)
+    bounds = tolerance * np.maximum(1.0, np.abs(goal))
+    sums, margin = changes @ weights, float(np.abs(weights) @ bounds)
+    order = np.argsort(sums)
+    needed = goal @ weights - sums
+    first = np.searchsorted(sums[order], needed - margin)
+    last = np.searchsorted(sums[order], needed + margin)
+    for i in np.flatnonzero(first < last).tolist():
+        for j in order[first[i] : last[i]].tolist():
+            if i < j and (np.abs(changes[i] + changes[j] - goal) <= bounds).all():
+                yield i, j

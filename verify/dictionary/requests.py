@@ -4,7 +4,8 @@ The requests are the same for every seed and solver. Their directions are generi
 opposite to another or with equal components, where honest programs branch differently.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
@@ -17,41 +18,48 @@ from ..case import Case
 from ..greeting import Greeting
 from ..kinematics.problems import facts
 from ..kinematics.skeletons import suits
-from ..mass_spring.cases import UNDAMPED
+from ..mass_spring.cases import ONE_MASS, UNDAMPED
 
 FK, IK = "forward_kinematics", "inverse_kinematics"
-FORCES, ENERGY = "mass_spring_forces", "energy"
+FORCES, ENERGY, STEP = "mass_spring_forces", "energy", "mass_spring_step"
+OF_SPRINGS = (FORCES, ENERGY, STEP)
 # The tasks and methods with a dictionary.
-TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"), (FORCES, ""), (ENERGY, ""))
+TASKS = ((FK, ""), (IK, "ccd"), (IK, "fabrik"), (FORCES, ""), (ENERGY, ""), (STEP, ""))
 ABOUT = sentence("a request that tells mistakes apart; no part of the verdict")
-# Parents, effector and target of each: a tree with an inner effector, a chain, a chain in a plane.
+# Parents, effector and target of each: a tree with an inner effector, a chain, one in a plane.
 TREE = ([-1, 0, 1, 1, 3, 4], 4, (1.4, -1.0, -1.4))
 CHAIN = ([-1, 0, 1, 2], 3, (-0.7, 1.1, 1.6))
 IN_PLANE = ([-1, 0, 1, 2], 3, (-0.6, -0.2, 0.0))
 # For solvers of positions alone: without rotations, in a plane as well.
 AT_REST = ([-1, 0, 1, 2], 3, (-0.5, -0.4, 0.0))
-# With tolerance and number of sweeps: single sweeps, then solves with an end by either limit. CCD
-# needs 12 sweeps to the tolerance, FABRIK 10: most round distances end solves elsewhere.
+# With tolerance and number of sweeps: single sweeps, then solves that end by either of them. CCD
+# needs 12 sweeps to the tolerance, FABRIK 10: most round distances end them elsewhere.
 PROBLEMS = (
     (*TREE, 0.0, 1), (*CHAIN, 0.0, 1), (*IN_PLANE, 0.0, 1), (*TREE, 0.0, 3),
     (*CHAIN[:2], (-1.1, -0.6, 0.3), 4e-3, 16), (*AT_REST, 0.0, 1),
 )  # fmt: skip
 # A triangle with a tail; every spring has numbers of its own.
 SPRINGS = np.array([[0, 1], [2, 0], [1, 2], [2, 3]])
-# The zeros in each request of a mass-spring system. The first three show springs, gravity and
-# motion alone, so a mistake in springs hides no mistake in gravity; the last shows all three.
+# What is zero in each request of a mass-spring system: the first three show springs, gravity and
+# motion alone, so that a mistake in one hides none in another; the last shows all of them.
 ZEROS = (
     ("dampings", "gravity", "velocities"),
     ("stiffnesses", "dampings", "velocities"),
     ("stiffnesses", "gravity"),
     (),
 )
-# The outputs with keys, in their order: outputs of poses, and outputs of the path alone.
+# A step's pins show beside dampers of any kind: without them.
+PINNED, UNDAMPED_PINS = [0, 3], ("dampings",)
+# Steps are short enough for ten local/global iterations to converge, so that the number of
+# iterations hides no mistake. Plain requests have the step that many solvers keep [s].
+H, PLAIN_H = 0.13, 1.0 / 60.0
+# The outputs that have keys, in their order: what poses have, and what the path has alone.
 OUTPUTS = {
     FK: ("positions", "rotations"),
     IK: ("local_rotations", "path"),
     FORCES: ("forces",),
     ENERGY: ("total", "kinetic", "potential", "elastic", "gravitational"),
+    STEP: ("positions", "velocities"),
 }
 # Keys beyond this come from divisions by nearly zero.
 LARGEST = 1e6
@@ -60,9 +68,9 @@ SMALLEST = 1e-12
 
 
 def requests(task: str, method: str) -> list[Case]:
-    """Return the requests of a task and a method, of poses with different starts alone."""
-    if task in (FORCES, ENERGY):
-        return [_spring_request(task, number) for number in range(len(ZEROS))]
+    """Return the requests of a task and a method: of poses those alone that differ in the start."""
+    if task in OF_SPRINGS:
+        return _spring_requests(task)
     cases = []
     for number, problem in enumerate(PROBLEMS if task == IK else PROBLEMS[:3]):
         parents, effector, target, tolerance, sweeps = problem
@@ -91,8 +99,27 @@ def is_solve(case: Case) -> bool:
     return bool(case.inputs.get("max_iterations", 1) > 1)
 
 
-def _spring_request(task: str, number: int) -> Case:
-    """Return a request of a mass-spring system in which some inputs are zero."""
+def _spring_requests(task: str) -> list[Case]:
+    """Return the requests of a task of mass-spring systems, those with plain numbers last."""
+    systems = [_system(zeros) for zeros in ZEROS]
+    if task == STEP:
+        pins = np.array(PINNED)
+        systems = [{**system, "pinned": pins[:0], "h": H} for system in systems]
+        systems.append({**_system(UNDAMPED_PINS), "pinned": pins, "h": H})
+        systems[-1]["velocities"][pins] = 0.0
+        free, pinned = ({"pinned": p, "h": PLAIN_H} for p in (pins[:0], np.array([1])))
+        systems += [_plain_system(0.0) | free, _plain_system(0.7) | pinned]
+        systems[-1]["velocities"][1] = 0.0
+    else:
+        systems.append(_plain_system(0.7))
+    return [
+        Case(f"telling {number}", task, system, "telling", ABOUT)
+        for number, system in enumerate(systems, 1)
+    ]
+
+
+def _system(zeros: Sequence[str]) -> dict[str, Any]:
+    """Return a mass-spring system in which some inputs are zero."""
     count, springs = 1 + int(SPRINGS.max()), SPRINGS.copy()
     x = fractions(3 * count, 31).reshape(count, 3)
     lengths = np.linalg.norm(np.diff(x[springs], axis=1)[:, 0], axis=1)
@@ -107,18 +134,29 @@ def _spring_request(task: str, number: int) -> Case:
         "positions": x,
         "velocities": fractions(3 * count, 36).reshape(count, 3),
     }
-    inputs |= {name: 0.0 * inputs[name] for name in ZEROS[number]}
-    return Case(f"telling {number + 1}", task, inputs, "telling", ABOUT)
+    return inputs | {name: 0.0 * inputs[name] for name in zeros}
+
+
+def _plain_system(damping: float) -> dict[str, Any]:
+    """Return a system in a plane with equal numbers, for solvers that take no others."""
+    rest = 0.8 * np.array([[0, 0, 0], [1, 0, 0], [0.5, 0.75**0.5, 0], [-0.1, 0.75**0.5 + 0.8, 0]])
+    return {
+        "masses": np.full(4, ONE_MASS),
+        "springs": SPRINGS.copy(),
+        "rest_lengths": np.full(4, 0.8),
+        "stiffnesses": np.full(4, 90.0),
+        "dampings": np.full(4, damping),
+        "gravity": np.array([0.0, -9.81, 0.0]),
+        "positions": rest + 0.1 * fractions(12, 37).reshape(4, 3) * [1, 1, 0] + [0.3, 1.1, 0.0],
+        "velocities": fractions(12, 38).reshape(4, 3) * [1, 1, 0],
+        "rest_positions": rest,
+    }
 
 
 def suitable(case: Case, greeting: Greeting) -> bool:
     """Return whether a solver takes a request: any numbers, or free joints in space or a plane."""
-    if case.task in (FORCES, ENERGY):
-        system = greeting.system
-        numbers = {system.masses, system.stiffnesses, system.dampings, system.rest_lengths}
-        takes_all = numbers == {"each", "given"} and system.gravity == "vector"
-        is_damped = case.task == ENERGY or greeting.step.damper not in UNDAMPED
-        return takes_all and is_damped and greeting.fixed.gravity is None and not greeting.planar
+    if case.task in OF_SPRINGS:
+        return _suits_springs(case, greeting)
     is_planar = not case.inputs["offsets"][:, 2].any()
     is_at_rest = bool((case.inputs["local_rotations"][:, 0] == 1.0).all())
     is_free = greeting.rotations is not is_at_rest and not greeting.limits
@@ -131,12 +169,50 @@ def suitable(case: Case, greeting: Greeting) -> bool:
     )
 
 
+def _suits_springs(case: Case, greeting: Greeting) -> bool:
+    """Return whether a solver takes the numbers of a mass-spring system."""
+    system, fixed, inputs = greeting.system, greeting.fixed, case.inputs
+    numbers = {system.masses, system.stiffnesses, system.dampings, system.rest_lengths}
+    takes_all = numbers == {"each", "given"} and system.gravity == "vector"
+    is_in_plane = not inputs["positions"][:, 2].any()
+    is_damped = case.task != ENERGY and bool(inputs["dampings"].any())
+    return (
+        (is_in_plane or not greeting.planar)
+        and (is_in_plane or takes_all)
+        and (system.pinned or not len(inputs.get("pinned", ())))
+        and not (is_damped and greeting.step.damper in UNDAMPED)
+        and not system.continues
+        and (fixed.gravity is None or np.array_equal(fixed.gravity, inputs["gravity"]))
+        and fixed.h in (None, inputs.get("h"))
+    )
+
+
+def fitted_to(case: Case, greeting: Greeting) -> Case:
+    """Return a request with the optional inputs that a solver takes, and no others."""
+    inputs, system = dict(case.inputs), greeting.system
+    if case.task not in OF_SPRINGS:
+        return case
+    if system.rest_lengths != "measured":
+        inputs.pop("rest_positions", None)
+    if system.state == "previous_positions" and case.task == STEP:
+        inputs["previous_positions"] = inputs["positions"] - inputs["h"] * inputs["velocities"]
+    if system.external_forces and case.task == STEP:
+        inputs["external_forces"] = np.zeros_like(inputs["positions"])
+    if system.tension_only:
+        inputs["tension_only"] = np.zeros(len(inputs["springs"]), bool)
+    return replace(case, inputs=inputs)
+
+
 def keys(values: Mapping[str, Any], right: Mapping[str, Any], case: Case) -> FloatArray:
     """Return the key of each output of an answer, NaN where the output is missing.
 
-    A key is the difference from the right answer over its size, projected on a direction.
+    A key is the difference from the right answer over its size, projected on one direction.
     """
     names = OUTPUTS[case.task]
+    if case.task == STEP:  # displacements are small beside positions
+        right = {**right, "positions": right["positions"] - case.inputs["positions"]}
+        if "positions" in values:
+            values = {**values, "positions": values["positions"] - case.inputs["positions"]}
     sizes = [
         float(np.abs(output).max())
         for name in names

@@ -139,10 +139,10 @@ def without_near(
     return [exchange for exchange in compared if exchange.case.name not in near]
 
 
-def positions_alone(exchange: Exchange) -> Exchange:
-    """Return an answer with its positions alone."""
-    assert isinstance(exchange.answer, Answer)
-    return replace(exchange, answer=Answer({"positions": exchange.answer.values["positions"]}, 0.0))
+def positions_alone(compared: Sequence[Exchange]) -> list[Exchange]:
+    """Return the answers that have positions, without their other outputs."""
+    positions = ((e, e.answer.values.get("positions")) for e in compared)  # type: ignore[union-attr]
+    return [replace(e, answer=Answer({"positions": x}, 0.0)) for e, x in positions if x is not None]
 
 
 def compare(

@@ -72,7 +72,7 @@ class Program:
 
     def __init__(self, source: str) -> None:
         self.source = source
-        self._choices: Mapping[str, Any] = {}  # the values of constants that were chosen
+        self.choices: Mapping[str, Any] = {}  # the values of constants that were chosen
         self._tree = ast.parse(source)
         for loop in ast.walk(self._tree):
             if isinstance(loop, ast.For | ast.While):
@@ -93,13 +93,13 @@ class Program:
 
     def choose(self, constants: Mapping[str, Any]) -> None:
         """Give constants of the program other values."""
-        self._choices = constants
+        self.choices = constants
         self.names |= constants
 
     def with_source(self, source: str) -> "Program":
         """Return another program with the same choices; raise SyntaxError of invalid source."""
         program = Program(source)
-        program.choose(self._choices)
+        program.choose(self.choices)
         return program
 
     def _pass(self) -> None:
@@ -158,7 +158,7 @@ class Program:
         shapes: dict[str, dict[str, str]] = {}
 
         def trace(frame: Any, event: str, _: Any) -> Any:
-            function = frame.f_code.co_name
+            function = frame.f_code.co_qualname.partition(".")[0]  # a function in it is a part
             if frame.f_code.co_filename != FILE or function not in texts:
                 return None
             self._lines.add(frame.f_lineno)

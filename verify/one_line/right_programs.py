@@ -1,7 +1,7 @@
 """The right programs of a task, known faults in their lines, and the comparable part of answers."""
 
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -22,23 +22,22 @@ from .mutants import Program
 
 _TABLE = tomllib.loads(Path(__file__).with_name("faults.toml").read_text(encoding="utf-8"))
 FAULTS = _TABLE["line"]
-# The names of all faults by lines of programs alone.
+# The names of all faults that only the lines of programs tell.
 BY_LINES = {*FAULTS, *_TABLE["known"]}
-# The first of these kinds is named for changes with equal answers.
+# Of changes that no answer tells apart the first of these kinds is named.
 KINDS = list(FAULTS)
-# The tasks whose known faults programs of a task may have; programs of steps have all faults of
-# robots.
+# The tasks whose known faults programs of a task may have; those of steps have all of robots.
 FOUNDATIONS = BUILDS_ON | {tool_steps.TASK: (*BUILDS_ON["robot_track"], "robot_track")}
 # The declaration of programs of Jacobian methods.
 JACOBIAN = '"methods": ["jacobian"]'
-# Fields of a declared step in constants of a program.
-CHOICES = ("method", "order", "start", "iterations", "substeps", "damper")
+# Fields of a declared step that constants of a program may have.
+CHOICES = ("method", "order", "start", "iterations", "substeps", "damper", "pins")
 # Faults of these families are named in other ways than by the lines of a program.
 SELF_NAMED = ("LINE", "STATE")
 
 
 def faults_in(source: str, task: str, method: str = "") -> list[CodedFault]:
-    """Return the known faults of a task and its foundations, whose lines a program has."""
+    """Return the known faults of a task, and of those it builds upon, whose lines a program has."""
     return [
         fault
         for fault in coded_faults().values()
@@ -55,7 +54,7 @@ def _is_shared(fault: CodedFault, task: str, method: str) -> bool:
 
 
 def is_of(program: str, task: str, method: str) -> bool:
-    """Return whether a right program has a task, and a method of this task.
+    """Return whether a right program has a task, and a method of it.
 
     A Jacobian method has a name of its solver's own; the program's stands in its declaration.
     """
@@ -65,7 +64,7 @@ def is_of(program: str, task: str, method: str) -> bool:
 
 
 def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
-    """Yield the right programs of a task with its method and the declared step."""
+    """Yield the right programs of a task that have its method and the declared step."""
     for name, entry in PROGRAMS.items():
         if not is_of(name, task, method) or not entry.get("searched", True):
             continue
@@ -77,18 +76,24 @@ def programs_of(task: str, method: str, step: Step) -> Iterator[Program]:
         methods = (None, own.get("method"), *entry.get("methods", ()))
         if is_fixed and declared.get("method") in methods:
             chosen = {f.upper(): declared[f] for f in choices if declared[f] is not None}
-            yield from _in_undeclared_choices(program, chosen, entry.get("undeclared", {}))
+            yield from _in_choices(name, chosen)
 
 
-def _in_undeclared_choices(
-    program: Program, chosen: Mapping[str, Any], undeclared: Mapping[str, Sequence[Any]]
-) -> Iterator[Program]:
-    """Yield a program with each combination of a greeting's open choices."""
-    values = {name: each for name, each in undeclared.items() if name not in chosen}
+def in_choices(name: str, step: Step) -> Iterator[Program]:
+    """Yield a program with each combination of its choices that a greeting leaves open."""
+    open_choices = PROGRAMS[name].get("undeclared", {})
+    declared = {field: getattr(step, field.lower(), None) for field in open_choices}
+    return _in_choices(name, {f: value for f, value in declared.items() if value is not None})
+
+
+def _in_choices(name: str, chosen: Mapping[str, Any]) -> Iterator[Program]:
+    """Yield a program with each combination of the choices that are not made."""
+    undeclared = PROGRAMS[name].get("undeclared", {})
+    values = {field: each for field, each in undeclared.items() if field not in chosen}
     for combination in product(*values.values()):
-        variant = Program(program.source)
-        variant.choose({**dict(zip(values, combination, strict=True)), **chosen})
-        yield variant
+        program = Program(source_of(name))
+        program.choose({**dict(zip(values, combination, strict=True)), **chosen})
+        yield program
 
 
 def comparable(exchange: Exchange) -> Exchange:
@@ -113,7 +118,7 @@ def comparable(exchange: Exchange) -> Exchange:
 
 
 def answer_of(program: Program, method: str, case: Case) -> Mapping[str, Any]:
-    """Return the comparable outputs of a right program; raise ArithmeticError without an answer."""
+    """Return the comparable outputs of a right program; raise ArithmeticError if it has none."""
     if case.task == tool_steps.TASK:
         return tool_steps.answer_of(program, case)
     function = program.names.get(method) or program.names.get(case.task)

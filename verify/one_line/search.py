@@ -1,4 +1,4 @@
-"""Search the right program whose known fault or changed line gives wrong answers."""
+"""Search the right program with a known fault, or a changed line, that gives wrong answers."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -7,7 +7,7 @@ import numpy as np
 
 from ..dictionary.look_up import UNSTEADY, Proposals, look_up
 from ..dictionary.requests import TASKS
-from ..exchange import Answer, Connection, Exchange
+from ..exchange import Answer, Connection
 from ..explain import MORE
 from ..fault_programs import IN_DICTIONARY, source_of
 from ..gaps import difference
@@ -16,23 +16,33 @@ from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.early_ends import EARLY_ENDS
 from ..kinematics.limits import READINGS
-from ..take.precision import judging_greeting
+from ..precision import judging_greeting
 from . import tool_steps
 from .answers import compared_answers, doubtful_answers, positions_alone, with_sweeps, without_near
-from .candidates import MIN_SHARE, OF_STEPS, TOLERANCE, of_entries, of_numbers, of_program, run_of
+from .candidates import (
+    MIN_SHARE,
+    OF_STEPS,
+    TOLERANCE,
+    Evidence,
+    of_entries,
+    of_numbers,
+    of_program,
+    parts_of,
+    run_of,
+)
 from .fitted import is_fitted
 from .mutants import Program
-from .right_programs import answer_of, programs_of
+from .right_programs import programs_of
 
-# No further right program is changed after so many changes, of half a millisecond each; beside a
-# dictionary, only a search finds the few remaining changes.
+# No further right program is changed after so many changes, of half a millisecond each; where
+# changes are looked up, few are left that only a search finds.
 MAX_MUTANTS, MAX_BESIDE = 24_000, 4_000
 IN_CONVENTIONS = ("robot_jacobian", "forward_kinematics", *OF_STEPS)
-# The tasks whose answers tell numbers, without iterations.
+# The tasks whose answers tell numbers: they take no iterations.
 WITH_NUMBERS = ("mass_spring_forces", "energy", *OF_STEPS)
 # Where a right answer to all requests of the dictionary leaves known faults of rare cases alone.
 RARE_ELSEWHERE = ("mass_spring_forces", "energy")
-# So many of the nearest right steps are tried with known faults, and with changed lines.
+# Of right steps, so many that come nearest are tried with known faults, and with changed lines.
 NEAREST_KNOWN, NEAREST = 8, 2
 
 
@@ -42,10 +52,10 @@ def with_changed_line(
     connection: Connection | None = None,
     known_alone: bool = False,
 ) -> TaskReport:
-    """Return a report on wrong answers with the explaining fault or changed line.
+    """Return a report on wrong answers with the fault or changed line that explains them.
 
-    Beside a mistake behind most answers, or where all targets are reached, known faults have to
-    explain all answers. If `known_alone`, the search is for known faults of the dictionary. A
+    Beside a mistake that explains most answers, or where all targets are reached, the search is for
+    known faults that explain all; so it is if `known_alone`, among those that are looked up. A
     `connection` can be asked for what a dictionary tells apart.
     """
     named, share = report.diagnosis.explanations, _least_share(report)
@@ -60,7 +70,9 @@ def with_changed_line(
             return report
         share = 1.0
     proposals = None
-    if connection is not None and report.verdict >= Verdict.WRONG:
+    # a step of no declared method is undecided if no known step answers so
+    least = Verdict.UNDECIDED if report.task in OF_STEPS else Verdict.WRONG
+    if connection is not None and report.verdict >= least:
         proposals = look_up(connection, report.task, report.method, greeting)
         if proposals is not None and proposals.hint is not None:
             hints = (*report.diagnosis.hints, proposals.hint)
@@ -81,7 +93,7 @@ def with_changed_line(
 
 
 def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
-    """Return the change of a line with the steps of robots, a known fault before other changes.
+    """Return the change of a line that gives the steps of robots, a known fault before others.
 
     Other lines are changed in the first view alone: single steps show more than where solves end.
     """
@@ -93,10 +105,10 @@ def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[E
 
 
 def _least_share(report: TaskReport) -> float:
-    """Return the share of answers for a program to explain: many more than by the named mistake.
+    """Return the share of answers that a program has to explain: many more than what is named.
 
-    A program has to explain all beside named positions or readings of limits, since a program tells
-    of rotations as well. Beside a measured test at the ends of solves, all answers count too.
+    It has to explain all where answered positions are named, or how limits are read: a program
+    tells of rotations as well. So it has where a measured test ends solves.
     """
     named = report.diagnosis.explanations
     faults = {fault for explanation in named for fault in explanation.faults}
@@ -115,88 +127,96 @@ def changed_lines(
     is_known: bool = False,
     proposals: Proposals | None = None,
 ) -> tuple[Explanation, ...]:
-    """Return the change of a line with most wrong or doubtful answers, () if too few.
+    """Return the change of a line that gives most wrong or doubtful answers, () if too few.
 
     If `is_known`, the search is for known faults alone. Where a dictionary proposes changes, these
     are tried; the lines of its first program, if answers to all its requests are right.
     """
-    compared, tolerance = _compared(report, greeting, doubtful)
-    if not compared:
+    evidence = _evidence(report, greeting, doubtful)
+    if not evidence.answers:
         return ()
-    programs = list(programs_of(report.task, report.method, greeting.step))
-    if report.task == "inverse_kinematics":
-        programs = [program for program in programs if _tells(program, compared)]
+    has_limits = any("cones" in exchange.case.inputs for exchange in evidence.answers)
+    programs = [
+        program
+        for program in programs_of(report.task, report.method, greeting.step)
+        if has_limits is ("within" in program.names) or report.task != "inverse_kinematics"
+    ]
     best = tuple[Explanation, ...]()
     if proposals is not None:
         is_known |= not proposals.is_wrong and report.task in RARE_ELSEWHERE
-        if proposals.sweeps is not None:
-            compared = with_sweeps(compared, proposals.sweeps)
-        if proposals.of_positions:
-            compared = list(map(positions_alone, compared))
-        entries = [entry for entry in proposals.entries if entry.codes or not is_known]
-        best = of_entries(entries, report, compared, tolerance)
+        evidence = _as_proposed(evidence, proposals)
+        entries = [
+            entry for entry in proposals.entries
+            if not is_known or all(part.codes for part in parts_of(entry))
+        ]  # fmt: skip
         looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
         others = [program for program in programs if program.source not in looked_up]
-        best = best or _of_programs(others, report, compared, tolerance, is_known=True)
-        # With right answers to all requests of the dictionary, answers are wrong in special cases.
+        best = of_entries(entries, evidence, greeting)
+        best = best or _of_programs(others, evidence, is_known=True)
+        # Answers that are right to all requests of the dictionary are wrong in special cases.
         first = {source_of(names[0]) for names in IN_DICTIONARY.values()}
         programs = [p for p in programs if p.source in first and not proposals.is_wrong]
     is_choice = bool(doubtful) or report.task == tool_steps.TASK
-    if is_choice and any(_gives(program, report, compared, tolerance) for program in programs):
+    if is_choice and any(_gives(program, evidence) for program in programs):
         return ()
-    if not best:
-        best = _of_programs(programs, report, compared, tolerance, is_known)
+    best = best or _of_programs(programs, evidence, is_known)
     if report.task in WITH_NUMBERS and not best and not (doubtful or is_known):
-        names = IN_DICTIONARY.get(report.task, ())
-        programs = programs or [Program(source_of(name)) for name in names]
-        for program in programs[: 1 if report.task in OF_STEPS else None]:
-            best = best or of_numbers(program, report, compared, tolerance)
+        best = _of_numbers(evidence, greeting)
     return best if best and best[0].share >= MIN_SHARE else ()
 
 
-def _tells(program: Program, compared: Sequence[Exchange]) -> bool:
-    """Return whether poses tell a program: of limits or not; its constants show in rotations."""
-    has_limits = any("cones" in exchange.case.inputs for exchange in compared)
-    answers = [exchange.answer for exchange in compared]
-    is_shown = any(isinstance(a, Answer) and "local_rotations" in a.values for a in answers)
-    return has_limits is ("within" in program.names) and (is_shown or not is_fitted(program))
-
-
-def _compared(
+def _evidence(
     report: TaskReport, greeting: Greeting, doubtful: Sequence[CaseJudgement]
-) -> tuple[list[Exchange], float]:
-    """Return the answers for programs to give, and the relative difference of equal answers."""
+) -> Evidence:
+    """Return the answers that programs have to give."""
     compared = compared_answers(report, doubtful)
     tolerance = TOLERANCE[judging_greeting(compared, greeting)[0].precision]
     tolerance = tool_steps.SAME_STEP if report.task == tool_steps.TASK else tolerance
     compared = without_near(compared, report, tolerance)
     is_motion = report.task == tool_steps.MOTIONS
-    return compared[: tool_steps.MAX_MOTIONS if is_motion else None], tolerance
+    return Evidence(report, compared[: tool_steps.MAX_MOTIONS if is_motion else None], tolerance)
+
+
+def _as_proposed(evidence: Evidence, proposals: Proposals) -> Evidence:
+    """Return the answers with the sweeps that are always made, or their positions alone."""
+    answers = evidence.answers
+    if proposals.sweeps is not None:
+        answers = with_sweeps(answers, proposals.sweeps)
+    if proposals.of_positions:
+        answers = positions_alone(answers)
+    return evidence._replace(answers=answers)
+
+
+def _of_numbers(evidence: Evidence, greeting: Greeting) -> tuple[Explanation, ...]:
+    """Return the changed number of a right program, of the nearest one among steps."""
+    task = evidence.report.task
+    if task in OF_STEPS:
+        programs = list(programs_of(task, evidence.report.method, greeting.step))
+        programs = _nearest(programs, evidence)[:1]
+    else:
+        programs = [Program(source_of(name)) for name in IN_DICTIONARY[task]]
+    found = (of_numbers(program, evidence) for program in programs)
+    return next(filter(None, found), ())
 
 
 def _of_programs(
-    programs: Sequence[Program],
-    report: TaskReport,
-    compared: Sequence[Exchange],
-    tolerance: float,
-    is_known: bool,
+    programs: Sequence[Program], evidence: Evidence, is_known: bool
 ) -> tuple[Explanation, ...]:
-    """Return the fault or changed line of some programs with most answers.
+    """Return the fault or changed line of some programs that gives most answers.
 
-    The nearest of many right steps are tried, all known faults first.
+    Of many right steps those are tried that come nearest, all known faults first.
     """
-    best, functions = tuple[Explanation, ...](), set[str]()
-    if report.task in tool_steps.SOLVES:
+    best, functions, task = tuple[Explanation, ...](), set[str](), evidence.report.task
+    if task in tool_steps.SOLVES:
         functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
-    most = MAX_BESIDE if report.task in {task for task, _ in TASKS} else MAX_MUTANTS
-    most = tool_steps.MAX_MUTANTS.get(report.task, most)
-    for program, known_alone in _trials(programs, report, compared, is_known):
+    most = MAX_BESIDE if task in {task for task, _ in TASKS} else MAX_MUTANTS
+    most = tool_steps.MAX_MUTANTS.get(task, most)
+    for program, known_alone in _trials(programs, evidence, is_known):
         if not known_alone and is_fitted(program) and best and best[0].share >= MIN_SHARE:
             break
-        if report.task in IN_CONVENTIONS:
+        if task in IN_CONVENTIONS:
             functions.clear()
-        changed = None if known_alone else functions
-        explanations = of_program(program, report, compared, tolerance, changed)
+        explanations = of_program(program, evidence, None if known_alone else functions)
         best = max(best, explanations[:1], key=lambda e: e[0].share if e else 0.0)
         mutant_count = sum(other.mutant_count for other in programs)
         if (best and best[0].share == 1.0) or mutant_count > most:
@@ -205,18 +225,15 @@ def _of_programs(
 
 
 def _trials(
-    programs: Sequence[Program],
-    report: TaskReport,
-    compared: Sequence[Exchange],
-    is_known: bool,
+    programs: Sequence[Program], evidence: Evidence, is_known: bool
 ) -> list[tuple[Program, bool]]:
     """Return programs in the order of their trials, and whether known faults alone are tried.
 
     Motions take too long for changes of all lines.
     """
-    is_known |= report.task == tool_steps.MOTIONS
-    if report.task in OF_STEPS:
-        nearest = _nearest(programs, report, compared)
+    is_known |= evidence.report.task == tool_steps.MOTIONS
+    if evidence.report.task in OF_STEPS:
+        nearest = _nearest(programs, evidence)
         first = [(program, True) for program in nearest[:NEAREST_KNOWN]]
         return first + [(program, is_known) for program in nearest[:NEAREST]]
     # The lines of programs with fitted constants take seconds each.
@@ -224,32 +241,28 @@ def _trials(
     return first + [(program, is_known) for program in programs]
 
 
-def _nearest(
-    programs: Sequence[Program], report: TaskReport, compared: Sequence[Exchange]
-) -> list[Program]:
-    """Return programs in the order of equal answers, then of distance."""
+def _nearest(programs: Sequence[Program], evidence: Evidence) -> list[Program]:
+    """Return programs, those first that give most answers, then those that come nearest."""
 
     def score(program: Program) -> tuple[int, float]:
-        gaps = []
-        for exchange in compared:
-            assert isinstance(exchange.answer, Answer)
-            try:
-                values = answer_of(program, report.method, exchange.case)
-                gaps.append(difference(values, exchange.answer.values))
-            except ArithmeticError:
-                gaps.append(np.inf)
+        gaps = _gaps(program, evidence)
         return -sum(gap <= TOLERANCE["single"] for gap in gaps), float(np.median(gaps))
 
     return sorted(programs, key=score)
 
 
-def _gives(
-    program: Program, report: TaskReport, compared: Sequence[Exchange], tolerance: float
-) -> bool:
+def _gives(program: Program, evidence: Evidence) -> bool:
     """Return whether a right program gives all answers."""
-    run = run_of(program, report, compared)
-    pairs = ((run(one.case), one.answer) for one in compared)
-    return all(
-        isinstance(answer, Answer) and difference(right, answer.values) <= tolerance
-        for right, answer in pairs
-    )
+    return max(_gaps(program, evidence)) <= evidence.tolerance
+
+
+def _gaps(program: Program, evidence: Evidence) -> list[float]:
+    """Return the relative difference of each answer from a program's, infinite without any."""
+    run, gaps = run_of(program, evidence), list[float]()
+    for exchange in evidence.answers:
+        assert isinstance(exchange.answer, Answer)
+        try:
+            gaps.append(difference(run(exchange.case), exchange.answer.values))
+        except ArithmeticError:
+            gaps.append(np.inf)
+    return gaps

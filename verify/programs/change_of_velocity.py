@@ -5,7 +5,7 @@ import numpy as np
 from .parts.springs import springs_at
 
 PLUMBOB = {"step": {"method": "linearised", "start": "x_n", "damper": "explicit"}}
-DAMPER = "explicit"
+DAMPER, PINS = "explicit", "eliminated"
 
 
 def dampers_at(x, v, springs, dampings):
@@ -39,7 +39,9 @@ def mass_spring_step(masses, springs, rest_lengths, stiffnesses, dampings,
     A, b = M + h**2 * K, h * (f - h * K @ v)
     if DAMPER == "end_velocity" or DAMPER == "length_rate":
         A = A + h * C
-    free = np.setdiff1d(np.arange(len(m)), 3 * pinned[:, None] + np.arange(3))
+    free = np.arange(len(m))
+    if PINS != "overwritten":
+        free = np.setdiff1d(free, 3 * pinned[:, None] + np.arange(3))
     dv = np.zeros(len(m))
     dv[free] = np.linalg.solve(A[np.ix_(free, free)], b[free])
     v = (v + dv).reshape(-1, 3)
