@@ -211,6 +211,8 @@ def test_numbers_side_by_side_are_whole():
         row = comparison.rows(one)[0]
         assert all(number in text for side in comparison.texts(row) for number in side.split())
         assert apart < 1e-10 or max(map(len, text.split("\n"))) <= terminal.WIDTH
+    row = comparison.NumberRow("x", [1.23456], [2.34567])
+    assert comparison.texts(row) == ("1.235", "2.346")
 
 
 def judgement(verdict, words="One is off.", name="one", size=1, digits=None,
