@@ -1,7 +1,7 @@
 """Measure a block and make a record of its result, or of its failure."""
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from datetime import UTC, datetime
 
 from ..peers.protocol import describe
@@ -24,22 +24,23 @@ def now() -> str:
 
 def measure(block: Block) -> Record:
     """Measure a block; an exception becomes a record with the reason, and costs no other block."""
-    begin = time.perf_counter()
-    try:
-        measured = block.measure()
-        return _checked(block, measured, time.perf_counter() - begin)
-    except Exception as error:  # an exception of a solver is its result
-        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
-            raise KeyboardInterrupt from None
-        return record_of(block, failure(describe(error)), time.perf_counter() - begin)
+    return _records([block], lambda: [block.measure()])[0]
 
 
 def measure_together(blocks: Sequence[Block]) -> list[Record]:
     """Measure the blocks of a group; an exception becomes the record of each."""
-    begin, groups = time.perf_counter(), [block.group for block in blocks if block.group]
+    groups = [block.group for block in blocks if block.group]
+    return _records(blocks, lambda: groups[0].measure([group.job for group in groups]))
+
+
+def _records(blocks: Sequence[Block], call: Callable[[], Sequence[Measured]]) -> list[Record]:
+    """Return a record for each block of the results of a call."""
+    begin = time.perf_counter()
     try:
-        results = groups[0].measure([group.job for group in groups])
-    except Exception as error:
+        results = call()
+    except Exception as error:  # an exception of a solver is its result
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Ctrl-C inside compiled code
+            raise KeyboardInterrupt from None
         results = [failure(describe(error))] * len(blocks)
     seconds = (time.perf_counter() - begin) / len(blocks)
     return [_checked(*pair, seconds) for pair in zip(blocks, results, strict=True)]

@@ -376,6 +376,15 @@ def test_a_row_says_what_measures_it_again(make, run):
     assert source("no record").command == ""
 
 
+def test_a_solver_cut_short_is_not_ranked(run):
+    cut = run("slow", 3, seconds=[1.0, 1.0, 1.0])
+    records = [run("a", 150), run("b", 20), cut]
+    for question in (MOST, FASTEST):
+        assert "slow" not in sentence(records, question)
+        assert sentence(records, question).startswith("On the arm, from one start, a solves ")
+    assert headlines.headlines(Results([records[0], cut])) == []
+
+
 def test_the_faster_of_two_comes_first_with_the_ratio_and_its_interval_inverted():
     ratio = metrics.Interval(0.5, 0.4, 0.8)
     first, second, inverted = headlines._in_order("a", "b", ratio)

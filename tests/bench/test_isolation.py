@@ -271,7 +271,7 @@ class Attempts:
             answer = self.answers.pop(0)
             if isinstance(answer, Exception):
                 raise answer
-            return answer
+            return answer._replace(time=OwnTime(0.25))
 
         return solve
 
@@ -294,7 +294,10 @@ NOTHING, LATER = SolverOutput(None, False), SolverOutput(np.ones(7), True)
     ids=["claimed", "silent", "raises", "raises in the end", "beyond"],
 )
 def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, claim, error):
-    """Targets are converted for every restart before the clock runs, each from its own start."""
+    """Targets are converted for every restart before the clock runs, each from its own start.
+
+    Times that a solver measures are added.
+    """
     attempts = Attempts(*answers)
     request = PoseRequest(None, None, np.full(7, 0.5))
     solve = restarted(attempts, robot("iiwa14"), 3)(request)
@@ -304,6 +307,7 @@ def test_restarts_end_with_the_first_claim_within_the_limits(answers, count, q, 
     assert answer.claim is claim
     assert answer.error == (f"ArithmeticError: {error}" if error else "")
     assert (len(attempts.requests), len(attempts.starts)) == (4, count)
+    assert error or answer.time == OwnTime(0.25 * count)
     assert (attempts.starts[0] == 0.5).all()
     assert len({tuple(start) for start in attempts.starts}) == count
 

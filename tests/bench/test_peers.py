@@ -10,13 +10,13 @@ import pytest
 
 from plumbob.bench import clock
 from plumbob.bench.measure.isolation import Solved
-from plumbob.bench.measure.timing import Job, restarted
+from plumbob.bench.measure.timing import Job
 from plumbob.bench.peers import protocol
 from plumbob.bench.peers.catalogue import PEERS, PLUMBOB_LM
 from plumbob.bench.peers.ik import placo
 from plumbob.bench.peers.peer import ONE_START, PORTFOLIO, RESTARTS
 from plumbob.bench.peers.protocol import OwnTime, SolverOutput, UnableError
-from plumbob.bench.problems.evaluate import PoseRequest, Targets, Tolerance, evaluator_of
+from plumbob.bench.problems.evaluate import Targets, Tolerance, evaluator_of
 from plumbob.bench.problems.robot_targets import robot_targets, uniform_targets, unreachable_targets
 from plumbob.bench.problems.robots import CHARACTER, LIMIT_TOLERANCE, is_installed, robot
 from plumbob.reference.inverse_kinematics.prepared import PreparedIK
@@ -152,28 +152,6 @@ def test_a_peer_in_an_environment_of_its_own_is_found_there(tmp_path, monkeypatc
         facts.parent.mkdir(parents=True)
         facts.write_text(f"Metadata-Version: 2.1\nName: placo\nVersion: {version}\n")
     assert placo.PEER.version == version
-
-
-def measuring(seconds):
-    """A solver that claims its third attempt, and says how long each of them took."""
-    attempts = []
-
-    def ask(request):
-        def solve():
-            attempts.append(request)
-            return SolverOutput(request.start, len(attempts) == 3, OwnTime(seconds))
-
-        return solve
-
-    return ask
-
-
-def test_times_that_a_solver_measures_are_added_over_its_restarts():
-    arm = robot("iiwa14")
-    nowhere = np.zeros((1, 3)), np.eye(3)[None], arm.draw(np.random.default_rng(0), 1)[0]
-    answer = restarted(measuring(0.25), arm, 5)(PoseRequest(*nowhere))()
-    assert answer.claim
-    assert answer.time == OwnTime(0.75)
 
 
 @pytest.mark.parametrize("restarts", [0, 3])

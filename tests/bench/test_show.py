@@ -207,10 +207,10 @@ FAULTS = {
     "it raises": (RAISES, ["circle"], "frame 1 of.*raised KeyError in line 1 of mine.py: 'oh'"),
     "no pose": ("def inverse_kinematics(target): return {'residual': 0.5}", ["circle"],
                 "expected positions in the answer.*got residual"),
-    "a syntax error": ("def f(:", ["circle"], "expected a solver, got.*SyntaxError in line 1"),
-    "no motions as bones": (TRACKS, ["circle", "-o", "a.bvh"], "one of .html, .svg, got '.bvh'"),
-    "no file": (None, ["circle"], "mine.py, which does not exist"),
     "two solvers": (TRACKS, ["circle", "--", "b"], "expected one solver, got --with and a program"),
+    "a syntax error": ("def f(:", ["circle"], "expected a solver, got.*SyntaxError in line 1"),
+    "no file": (None, ["circle"], "mine.py, which does not exist"),
+    "no motions as bones": (TRACKS, ["circle", "-o", "a.bvh"], "one of .html, .svg, got '.bvh'"),
 }  # fmt: skip
 
 

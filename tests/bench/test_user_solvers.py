@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from plumbob.bench.experiments import blocks
 from plumbob.bench.experiments.arm import residuals_chart
 from plumbob.bench.experiments.chain import iterations_chart
 from plumbob.bench.experiments.cloth_peers import truth_chart
@@ -23,6 +24,7 @@ from plumbob.bench.problems.evaluate import Evaluator
 from plumbob.bench.problems.robots import ROBOTS, robot
 from plumbob.bench.tables.results import Results, printable
 from plumbob.cli.main import run_command
+from plumbob.cli.selection import MeasurementRequest, choose
 from plumbob.reference import Skeleton, forward_kinematics
 from plumbob.reference.formats import mjcf, urdf
 from plumbob.verify.connections import open_connection
@@ -259,18 +261,18 @@ def test_a_robot_solver_is_run_with_one_start_and_with_restarts(folder):
 
 
 def test_a_seed_draws_other_targets_and_is_on_record(folder):
-    words = ("--quick", "--targets", "3", "--problem", "chain/near", "--solver", "ccd",
-             "--problem", "robots/fetch", "--solver", "Plumbob LM, first phase")  # fmt: skip
+    words = ("--quick", "--targets", "3", "--problem", "chain/near", "--solver", "ccd")
     distances = []
     for seed in ((), ("--seed", "7")):
         assert bench("ik", *words, *seed) == 0
         distances += [tuple(one.measured["distance"]) for one in records("ccd")]
     assert distances[0] != distances[1]
-    seeds = {one.settings["seed"]: one for one in records() if one.problem == "robots/fetch"}
-    assert set(seeds) == {7, 1986}  # the latter is the default
-    positions = [one.measured["position"] for one in seeds.values()]
-    assert not np.array_equal(*positions)
     assert bench("ik", *words, "--seed", "-1") == 2
+    for seed, expected in ((None, 1986), (7, 7)):
+        request = MeasurementRequest(problems=["robots/fetch"], seed=seed)
+        scale = choose(["ik"], "quick", request).scale
+        fetch = [one for one in blocks("ik", scale) if one.problem == "robots/fetch"]
+        assert {one.settings["seed"] for one in fetch} == {expected}
 
 
 @pytest.mark.parametrize("name", [name for name in ROBOTS if name != "character"])
