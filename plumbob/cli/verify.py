@@ -99,6 +99,7 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
         options = CaseOptions(tuple(task or ()), rerun, thorough, seed)
         shown = Presentation(speaker(language), language, words)
+        finish: Callable[[], int]
         if names or template or export:
             finish = partial(_list, options, names, template, export, shown.say)
         elif self_test:
