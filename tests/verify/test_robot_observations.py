@@ -12,7 +12,7 @@ from plumbob.verify.exchange import Answer
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import CaseJudgement
 from plumbob.verify.kinematics import robot_jacobian, robot_models, robot_targets, robot_velocity
-from plumbob.verify.kinematics.robot_inverse_kinematics import trajectory_of
+from plumbob.verify.kinematics.trajectories import trajectory_of
 from plumbob.verify.laws import finding
 from plumbob.verify.observe.observations import of_tables
 from plumbob.verify.observe.robots import robot_evidence

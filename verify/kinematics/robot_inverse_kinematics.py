@@ -16,7 +16,7 @@ from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import robot_targets, rounding
 from .report import report
-from .robot_models import FARTHEST, judgement_of
+from .robot_models import judgement_of
 from .robot_targets import ANYWHERE, AT, AT_A_LIMIT, CLOSE, UNREACHED
 from .trajectories import Trajectory, is_falling_at, limit_laws, trajectories
 
@@ -30,7 +30,7 @@ def judge(
     method: str,
 ) -> TaskReport:
     """Judge coordinates by the laws of poses."""
-    motions = trajectories(exchanges, trajectory_of)
+    motions = trajectories(exchanges)
     pose_laws = PoseLaws(motions, greeting, _fails_at_zero(exchanges))
     judgements = [
         judge_case(
@@ -52,13 +52,6 @@ def _fails_at_zero(exchanges: Sequence[Exchange]) -> bool:
             is_claimed = bool(exchange.answer.values["converged"])
             claims.setdefault(exchange.case.family, []).append(is_claimed)
     return not all(claims.get(AT, [True])) and all(claims.get(CLOSE, [False]))
-
-
-def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
-    """Return an answer as a motion of one frame."""
-    q = np.clip(outputs["q"], -FARTHEST, FARTHEST)[None]
-    is_claimed = outputs.get("converged")
-    return Trajectory(case, q, None if is_claimed is None else bool(is_claimed))
 
 
 class PoseLaws:

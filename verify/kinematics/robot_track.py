@@ -10,14 +10,12 @@ import numpy as np
 from plumbob.reference.arguments import FloatArray
 from plumbob.text.sentence import sentence
 
-from ..case import Case
 from ..exchange import Exchange
 from ..greeting import Greeting
 from ..judgement import Finding, TaskReport, Verdict
 from ..laws import finding, judge_case, not_finite
 from . import robot_motions, rounding
 from .report import report
-from .robot_models import FARTHEST
 from .robot_targets import TOLERANCE
 from .trajectories import LENIENT, Trajectory, limit_laws, trajectories
 
@@ -55,7 +53,7 @@ def judge(
     method: str,
 ) -> TaskReport:
     """Judge motions by the laws of tracking."""
-    motions = trajectories(exchanges, motion_of)
+    motions = trajectories(exchanges)
     judgements = [
         judge_case(
             exchange, partial(_findings, exchange.case.name, motions, greeting),
@@ -87,12 +85,6 @@ def _findings(
         *_velocities(motion),
         *limit_laws(motion, motions.values()),
     ]
-
-
-def motion_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
-    """Return an answer as a motion."""
-    q = np.clip(outputs["q"], -FARTHEST, FARTHEST)
-    return Trajectory(case, q, velocities=outputs.get("velocities"))
 
 
 def _at(frame: int, law: Finding) -> Finding:

@@ -1,6 +1,6 @@
 """The frames of a robot's motion, or its one answer: errors, displacements of targets, jumps."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -14,9 +14,9 @@ from plumbob.reference.skeleton import Pose
 
 from ..case import Case
 from ..exchange import Answer, Exchange
-from ..judgement import Finding
+from ..judgement import CaseJudgement, Finding
 from ..laws import finding
-from .robot_models import ancestors, mechanism, tool_pose, twists_between
+from .robot_models import FARTHEST, ancestors, mechanism, tool_pose, twists_between
 from .robot_motions import ITERATIONS
 from .robot_targets import LIMIT_STEP
 
@@ -151,15 +151,21 @@ class Trajectory:
         return np.maximum(np.maximum(lower - self.q, self.q - upper), 0.0)
 
 
-def trajectories(
-    exchanges: Sequence[Exchange], trajectory_of: Callable[[Case, Mapping[str, Any]], Trajectory]
-) -> dict[str, Trajectory]:
-    """Return the trajectories of the answers with finite coordinates, by the names of cases."""
+def trajectory_of(case: Case, outputs: Mapping[str, Any]) -> Trajectory:
+    """Return an answer as a motion, that to a single target as a motion of one frame."""
+    q = np.reshape(outputs["q"], (-1, len(case.inputs["start"])))
+    claim = outputs.get("converged")
+    is_claimed = None if claim is None else bool(claim)
+    return Trajectory(case, np.clip(q, -FARTHEST, FARTHEST), is_claimed, outputs.get("velocities"))
+
+
+def trajectories(answers: Iterable[Exchange | CaseJudgement]) -> dict[str, Trajectory]:
+    """Return the motions of answers with finite coordinates, by the names of cases."""
     return {
-        exchange.case.name: trajectory_of(exchange.case, exchange.answer.values)
-        for exchange in exchanges
-        if isinstance(exchange.answer, Answer)
-        and np.isfinite(exchange.answer.values.get("q", np.nan)).all()
+        answer.case.name: trajectory_of(answer.case, answer.answer.values)
+        for answer in answers
+        if isinstance(answer.answer, Answer)
+        and np.isfinite(answer.answer.values.get("q", np.nan)).all()
     }
 
 

@@ -19,7 +19,7 @@ from ..kinematics.robot_models import (
     tool_pose,
 )
 from ..kinematics.robot_motions import TASK as TRACK
-from ..kinematics.trajectories import AT_LIMIT, EXACT, LENIENT, Trajectory
+from ..kinematics.trajectories import AT_LIMIT, EXACT, LENIENT, Trajectory, trajectories
 from .fits import fit, formula, is_sum
 from .joints import sound_cases
 from .separation import ElementTable, Findings, Statement, separation
@@ -45,7 +45,7 @@ def robot_evidence(task: str, judgements: Sequence[CaseJudgement]) -> Findings:
     elif task == robot_velocity.TASK:
         words = list(_tool_velocities(answered))
     else:
-        motions = [_motion(j) for j in answered if _is_finite(j)]
+        motions = list(trajectories(answered).values())
         words = [words for observe in OBSERVATIONS for words in observe(motions)]
         tables |= _joint_tables(motions, sound_cases(judgements))
     # without a place the verdicts say as much
@@ -111,20 +111,6 @@ def _joint_tables(motions: Sequence[Trajectory], sound: frozenset[str]) -> dict[
         if not is_still.all():
             moves.add(name, is_still, features, is_counted=moves_tool)
     return {"robot_limit": limits, "robot_movement": moves}
-
-
-def _is_finite(judgement: CaseJudgement) -> bool:
-    assert isinstance(judgement.answer, Answer)
-    return bool(np.isfinite(judgement.answer.values.get("q", np.nan)).all())
-
-
-def _motion(judgement: CaseJudgement) -> Trajectory:
-    assert isinstance(judgement.answer, Answer)
-    values = judgement.answer.values
-    q = np.reshape(values["q"], (-1, len(judgement.case.inputs["start"])))
-    claim = values.get("converged")
-    is_claimed = None if claim is None else bool(claim)
-    return Trajectory(judgement.case, q, is_claimed, values.get("velocities"))
 
 
 def _is_solve(motion: Trajectory) -> bool:

@@ -16,10 +16,10 @@ from plumbob.reference.arguments import FloatArray
 from ..case import Case
 from ..exchange import Answer
 from ..judgement import CaseJudgement, TaskReport
-from ..kinematics.robot_inverse_kinematics import trajectory_of
 from ..kinematics.robot_motions import TASK as TRACK
 from ..kinematics.robot_targets import LIMIT_STEP, TOLERANCE
 from ..kinematics.robot_targets import TASK as INVERSE
+from ..kinematics.trajectories import trajectory_of
 from ..laws import finding
 from .mutants import Program
 
