@@ -92,6 +92,19 @@ def test_known_faults_are_named_whatever_the_damping_of_the_solver_is(number):
     assert fault.code in explanation.codes
 
 
+def test_nothing_is_named_where_right_steps_are_clamped_and_some_solves_do_not_move():
+    report = report_of(source_of("tool step"), 1e-3, 1.0)
+    exchanges = [
+        replace(exchange, answer=Answer({"q": exchange.case.inputs["start"]}, 0.0))
+        if exchange.case.family == robot_targets.CLOSE else exchange
+        for exchange in report.exchanges
+    ]  # fmt: skip
+    report = replace(DISCIPLINES[TASK].judge(exchanges, GREETING, ""), exchanges=exchanges,
+                     greeting=GREETING)  # fmt: skip
+    assert report.verdict.name == "WRONG"
+    assert with_changed_line(report, GREETING).diagnosis.explanations == ()
+
+
 def test_frames_of_motions_are_poses_too():
     case = next(c for c in DISCIPLINES[TRACK].cases(Greeting(PROTOCOL, (TRACK,)), "", 0, False))
     q = np.tile(case.inputs["start"], (len(case.inputs["target_positions"]), 1)) + 0.1

@@ -82,9 +82,10 @@ def with_changed_line(
             proposals = None  # without a dictionary all lines are searched
     if known_alone and proposals is None:
         return report
-    explanations = _of_steps(report, greeting, is_known) or changed_lines(
-        report, greeting, doubtful, is_known, proposals
-    )
+    if report.task in tool_steps.SOLVES:
+        explanations = _of_steps(report, greeting, is_known)
+    else:
+        explanations = changed_lines(report, greeting, doubtful, is_known, proposals)
     if not explanations or explanations[0].share < min(share, 1.0):
         return report
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
@@ -95,10 +96,11 @@ def with_changed_line(
 def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
     """Return the change of a line that gives the steps of robots, a known fault before others.
 
-    Other lines are changed in the first view alone: single steps show more than where solves end.
+    Other lines are changed in the first view alone: single steps show more than where solves end,
+    and the loops of solvers differ.
     """
     views = list(tool_steps.views(report))
-    for view in (report, *views) if views else ():
+    for view in (report, *views):
         if explanations := changed_lines(view, greeting, is_known=True):
             return explanations
     return () if is_known or not views else changed_lines(views[0], greeting)
@@ -207,8 +209,6 @@ def _of_programs(
     Of many right steps those are tried that come nearest, all known faults first.
     """
     best, functions, task = tuple[Explanation, ...](), set[str](), evidence.report.task
-    if task in tool_steps.SOLVES:
-        functions |= {p.text_of(f) for p in programs for f in tool_steps.FUNCTIONS & p.names.keys()}
     most = MAX_BESIDE if task in {task for task, _ in TASKS} else MAX_MUTANTS
     most = tool_steps.MAX_MUTANTS.get(task, most)
     for program, known_alone in _trials(programs, evidence, is_known):
@@ -227,11 +227,7 @@ def _of_programs(
 def _trials(
     programs: Sequence[Program], evidence: Evidence, is_known: bool
 ) -> list[tuple[Program, bool]]:
-    """Return programs in the order of their trials, and whether known faults alone are tried.
-
-    Motions take too long for changes of all lines.
-    """
-    is_known |= evidence.report.task == tool_steps.MOTIONS
+    """Return programs in the order of their trials, and whether known faults alone are tried."""
     if evidence.report.task in OF_STEPS:
         nearest = _nearest(programs, evidence)
         first = [(program, True) for program in nearest[:NEAREST_KNOWN]]

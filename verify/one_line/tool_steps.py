@@ -30,8 +30,7 @@ TASK = "tool_step"
 SAME_STEP = 3e-3
 # Fewer joints than this reach no pose in other kinematics, and any damping fits their steps.
 MIN_JOINTS = 6
-# Functions of solves whose lines steps have tried, and how many motions are compared.
-FUNCTIONS = {"kinematics", "jacobian", "error_of"}
+# How many motions are compared.
 MAX_MOTIONS = 6
 # Steps shorter than this are rounding [rad, m], and joints as near to a limit are at the limit.
 SHORTEST = 1e-6
