@@ -79,12 +79,11 @@ HONEST = {
     "gain of a half": controller(gain=0.5),
     "weighted joints": controller(weights=np.array([1, 1, 2, 1, 0.3, 0.5, 0.3])),
     "posture in the null space": controller(iterations=1, posture=0.05),
-    "Levenberg-Marquardt": tracked,
     "fixed damping": partial(tracked, solver="damped_least_squares"),
 }
 
 
-@pytest.mark.sample("Levenberg")
+@pytest.mark.sample("damped least")
 @pytest.mark.parametrize("name", HONEST)
 def test_no_honest_controller_is_accused(name):
     connection = FunctionConnection({TASK: HONEST[name]}, Greeting(PROTOCOL, (TASK,)))
