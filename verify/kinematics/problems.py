@@ -203,7 +203,7 @@ def _stalled(method: str, inputs: Mapping[str, Any]) -> tuple[FloatArray, int]:
     """
     before, x = np.inf, forward(inputs)[0]
     for count in range(1, ALLOWED + 1):
-        distance = np.linalg.norm(x[inputs["effector"]] - inputs["target"])
+        distance = float(np.linalg.norm(x[inputs["effector"]] - inputs["target"]))
         if abs(before - distance) <= LOOSE:
             return x, count - 1
         before = distance

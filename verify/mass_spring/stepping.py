@@ -128,7 +128,8 @@ def _recognise(exchanges: tuple[Exchange, ...], declaration: _Declaration) -> Re
     probes = probes_of(exchanges, problems, every=True)
     is_constant = repeats(exchanges, 0.0) or repeats(exchanges, 1.0)
     telling = [] if is_constant else probes_of(exchanges, problems)
-    search, match, method = ModelSearch(telling, greeting), (), greeting.step.method
+    search, method = ModelSearch(telling, greeting), greeting.step.method
+    match: tuple[Option, ...] = ()
     if method != position_based.METHOD:
         match = search.run(probes)
     options = honest_options(match, greeting)

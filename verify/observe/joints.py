@@ -114,7 +114,8 @@ class ForwardPose:
         self.inputs, self.right = judgement.case.inputs, judgement.expected["rotations"]
         self.parents = np.asarray(self.inputs["parents"])
         self.offsets, self.local = self.inputs["offsets"], self.inputs["local_rotations"]
-        self.positions, self.raw = outputs.get("positions"), outputs.get("rotations")
+        self.positions: Any = outputs.get("positions")
+        self.raw: Any = outputs.get("rotations")
         unit = _unit(self.right if self.raw is None else self.raw)
         self.rotations = np.where(np.isfinite(unit), unit, self.right)
         self.above = _of_parents(self.rotations, self.parents, IDENTITY)

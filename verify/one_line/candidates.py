@@ -73,7 +73,7 @@ class RightProgram:
         """
         report, _, tolerance = self._evidence
         telling = telling_answers(self.different, self._same)
-        return explain(variants, telling, lambda _: tolerance, describe, trial_count(report))[0]
+        return explain(variants, telling, tolerance, describe, trial_count(report))
 
     def of_fault(self, wrong: Program) -> Run:
         """Return the function that answers as a program with a fault."""
