@@ -16,7 +16,7 @@ from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.early_ends import EARLY_ENDS
 from ..kinematics.limits import READINGS
-from ..precision import judging_greeting
+from ..take.precision import judging_greeting
 from . import tool_steps
 from .answers import compared_answers, doubtful_answers, positions_alone, with_sweeps, without_near
 from .candidates import (
