@@ -77,7 +77,7 @@ SENTENCES = {
         "Right everywhere: what springs pull",
     ],
     "velocities_without_h": ["Velocities are x' - x in all 58 cases"],
-    "quartic_energy": ["Every spring pulls -1/2 k l + 1/2 k l³/r² + c dl/dt"],
+    "quartic_energy": ["Its springs follow another law: the energy k r²/8 ("],
 }
 
 
@@ -132,7 +132,7 @@ OBSERVED = {
                 ["The rotation of each joint in a sweep is by the right angle in degrees"]),
     "two mistakes": (at_the_origin_with_a_long_link, INVERSE, "mine",
                      ["The root is at the origin", "Wrong in part: lengths of links"]),
-    "beyond reach": (still_beyond_reach, INVERSE, "mine", ["Wrong in part: the end of solves"]),
+    "beyond reach": (still_beyond_reach, INVERSE, "mine", ["Wrong where the target is out of reach"]),
 }  # fmt: skip
 
 

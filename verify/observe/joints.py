@@ -305,7 +305,10 @@ class SolvedPose:
         facts, allowed = self.facts, self.inputs["tolerance"] / self.size + TOLERANCE
         if "sweeps" not in facts:
             excess = (self.answer.distance - facts["least"]) / self.size
-            features = {"beyond_reach": facts["least"] > 0.0, "one_link": len(self.path) == 2}
+            links = np.linalg.norm(self.offsets[self.path[1:]], axis=1)
+            distance = np.linalg.norm(self.inputs["target"] - self.offsets[0])
+            is_beyond = bool(distance > (1.0 + TOLERANCE) * links.sum())
+            features = {"beyond_reach": is_beyond, "one_link": len(self.path) == 2}
             self.tables["end"].add(self.name, excess, features, allowed)
         elif self.method:
             growth = (self.answer.distance - facts["before"]) / self.size

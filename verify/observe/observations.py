@@ -32,6 +32,8 @@ TASKS = (forward_kinematics.TASK, problems.TASK, *OF_SPRINGS, *robots.TASKS)
 MIN_ANSWERS = 14
 # Failures after which no more is asked.
 ENDS = (FailureKind.CRASHED, FailureKind.HUNG, FailureKind.MEMORY)
+# A smaller part of wrong elements may be of honest choices: some right solves end early.
+MIN_PART = 0.25
 # The largest numbers of sentences before the sentence on right quantities, and of quantities there.
 SENTENCES, RIGHT = 3, 4
 
@@ -130,7 +132,11 @@ def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
                 count=len(table.elements),
             )
             (exact if table.is_law else everywhere).append(Statement(0.0, words, table.is_law))
-    partly = [_wrong_in_part(table) for table in tables if table.wrong_count]
+    partly = [
+        _wrong_in_part(table)
+        for table in tables
+        if table.wrong_count >= MIN_PART * len(table.elements) and table.wrong_count
+    ]
     return sorted(exact, key=_score) or sorted(vague, key=_score) or [*everywhere, *partly]
 
 
