@@ -46,10 +46,11 @@ NEAR, STEPS = poses(robot_targets.CLOSE), poses(robot_targets.STEP)
 
 
 @cache
-def right_pose(name):
+def right_pose(name, **limits):
     case = next(case for case in cases(POSE) if case.name == name)
+    limits = {side: np.full(len(case.inputs["axes"]), limit) for side, limit in limits.items()}
     tool = Pose(case.inputs["target_position"], case.inputs["target_rotation"])
-    return robot_models.solved(case.inputs, case.inputs["start"], tool)[0]
+    return robot_models.solved({**case.inputs, **limits}, case.inputs["start"], tool)[0]
 
 
 def solved(case, position=1.0, angle=1.0):
@@ -91,6 +92,17 @@ WRONG_POSES = [
 @pytest.mark.parametrize(("answer", "words"), WRONG_POSES)
 def test_another_meaning_of_coordinates_and_the_place_of_wrong_ones_are_said(answer, words):
     assert words in observed(POSE, lambda case: {"q": answer(case)}, NEAR)
+
+
+def test_targets_that_joints_at_limits_alone_miss_are_counted():
+    def clamped(case):
+        free = right_pose(case.name, lower=-9.0, upper=9.0)
+        return np.clip(free, case.inputs["lower"], case.inputs["upper"])
+
+    limited = poses(robot_targets.AT_A_LIMIT)
+    text = observed(POSE, lambda case: {"q": clamped(case)}, limited)
+    assert "are missed by joints at their limits alone" in text
+    assert "limits alone" not in observed(POSE, lambda case: {"q": solved(case)}, limited)
 
 
 @pytest.mark.parametrize(

@@ -27,6 +27,8 @@ from .separation import ElementTable, Findings, Statement, separation
 TASKS = (robot_targets.TASK, TRACK, robot_jacobian.TASK, robot_velocity.TASK)
 # Fewer answers, frames or joints say nothing.
 MIN_COUNT = 6
+# A solver that stays in a minimum may end there once or twice by chance.
+MIN_CLAMPED = 3
 # Shares of nearly all answers, and of few answers.
 NEARLY_ALL, FEW = 0.9, 0.5
 # A part of the tool's displacement is a factor times the error if the remainder is at most this
@@ -177,6 +179,20 @@ def _readings(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
             )  # fmt: skip
 
 
+def _clamped(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
+    """Yield how many targets are missed by joints at limits alone, as by clamps after a solve."""
+    clamped, missed = (
+        sum(int(getattr(motion, name).sum()) for motion in motions if _is_solve(motion))
+        for name in ("is_clamped", "is_missed")
+    )
+    if clamped >= MIN_CLAMPED and clamped >= FEW * missed:
+        yield sentence(
+            "Of {missed} targets that are missed, {clamped} are missed by joints at their limits "
+            "alone: the other joints are where they would be without limits.",
+            missed=missed, clamped=clamped,
+        )  # fmt: skip
+
+
 def _reported_velocities(motions: Sequence[Trajectory]) -> Iterator[Sentence]:
     """Yield the fewest terms whose sum is the reported velocities, unless these are right."""
     moving = [motion for motion in motions if motion.velocities is not None]
@@ -325,5 +341,5 @@ def _columns(
 
 
 OBSERVATIONS: Sequence[Callable[[Sequence[Trajectory]], Iterator[Sentence]]] = (
-    _readings, _reached_parts, _single_iterations, _reported_velocities,
+    _readings, _reached_parts, _clamped, _single_iterations, _reported_velocities,
 )  # fmt: skip
