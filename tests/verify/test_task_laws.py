@@ -31,6 +31,7 @@ from plumbob.verify.kinematics import (
 )
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import predict_track
+from plumbob.verify.kinematics.trajectories import trajectory_of
 from plumbob.verify.laws import HOLDS, equal_answers
 from plumbob.verify.mass_spring import energy, forces
 from plumbob.verify.mass_spring.problem import all_forces, problem_of
@@ -235,8 +236,9 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
     """Sixteen epsilons of the largest limit, 2.4 rad."""
     q = robot.inputs["start"].copy()
     q[3] = robot.inputs[side][3] + sign * share * 16 * EPSILON * 2.4
-    motions = {robot.name: robot_inverse_kinematics.trajectory_of(robot, {"q": q})}
-    (found, *_) = robot_inverse_kinematics._findings(robot, motions, ROBOTS, False, {"q": q})
+    motions = {robot.name: trajectory_of(robot, {"q": q})}
+    laws = robot_inverse_kinematics.PoseLaws(motions, ROBOTS, False)
+    (found, *_) = laws.findings(robot, {"q": q})
     assert (found.law, found.verdict, found.index) == ("limits kept", verdict, 3)
 
 
@@ -253,9 +255,8 @@ def test_coordinates_keep_both_limits_to_rounding(robot, side, sign, share, verd
 )
 def test_a_claim_is_about_the_position_and_the_rotation(robot, distance, angle, claim, verdicts):
     pose = SimpleNamespace(distance=distance, angle=angle, tolerance=1.0, tolerance_rotation=1.0)
-    found = robot_inverse_kinematics._target_laws(
-        pose, {"converged": claim}, robot, ROBOTS, False, False
-    )
+    laws = robot_inverse_kinematics.PoseLaws({}, ROBOTS, False)
+    found = laws._target_laws(pose, {"converged": claim}, robot)
     assert [finding.verdict for finding in found if finding.law == "claims"] == verdicts
 
 
