@@ -135,7 +135,9 @@ def of_tables(tables: Sequence[ElementTable]) -> list[Statement]:
     partly = [
         _wrong_in_part(table)
         for table in tables
-        if table.wrong_count >= MIN_PART * len(table.elements) and table.wrong_count
+        if table.wrong_count >= MIN_PART * len(table.elements)
+        and table.wrong_count
+        and not table.is_wrong_everywhere
     ]
     return sorted(exact, key=_score) or sorted(vague, key=_score) or [*everywhere, *partly]
 
