@@ -132,7 +132,8 @@ OBSERVED = {
                 ["The rotation of each joint in a sweep is by the right angle in degrees"]),
     "two mistakes": (at_the_origin_with_a_long_link, INVERSE, "mine",
                      ["The root is at the origin", "Wrong in part: lengths of links"]),
-    "beyond reach": (still_beyond_reach, INVERSE, "mine", ["Wrong where the target is out of reach"]),
+    "beyond reach": (still_beyond_reach, INVERSE, "mine",
+                     ["Wrong where the target is out of reach"]),
 }  # fmt: skip
 
 
