@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from plumbob.reference.arguments import FloatArray
+from plumbob.reference.arguments import FloatArray, IndexArray
 from plumbob.text.sentence import sentence
 
 from ..case import Case
@@ -106,16 +106,24 @@ def _spring_requests(task: str) -> list[Case]:
         pins = np.array(PINNED)
         systems = [{**system, "pinned": pins[:0], "h": H} for system in systems]
         systems.append({**_system(UNDAMPED_PINS), "pinned": pins, "h": H})
-        systems[-1]["velocities"][pins] = 0.0
-        free, pinned = ({"pinned": p, "h": PLAIN_H} for p in (pins[:0], np.array([1])))
-        systems += [_plain_system(0.0) | free, _plain_system(0.7) | pinned]
-        systems[-1]["velocities"][1] = 0.0
+        for system in systems:  # free or not, these particles are at rest
+            system["velocities"] = _at_rest(system["velocities"], pins)
+        pin = np.array([1])
+        systems.append({**_plain_system(0.0), "pinned": pin[:0], "h": PLAIN_H})
+        systems.append({**_plain_system(0.7), "pinned": pin, "h": PLAIN_H})
+        systems[-1]["velocities"] = _at_rest(systems[-1]["velocities"], pin)
     else:
         systems.append(_plain_system(0.7))
     return [
         Case(f"telling {number}", task, system, "telling", ABOUT)
         for number, system in enumerate(systems, 1)
     ]
+
+
+def _at_rest(velocities: FloatArray, particles: IndexArray) -> FloatArray:
+    """Return velocities that are zero for some particles."""
+    is_moving = ~np.isin(np.arange(len(velocities)), particles)
+    return np.where(is_moving[:, None], velocities, 0.0)
 
 
 def _system(zeros: Sequence[str]) -> dict[str, Any]:
@@ -246,4 +254,6 @@ def _key(output: FloatArray | None, right: FloatArray | None, size: float | None
 def fractions(count: int, start: int) -> FloatArray:
     """Return numbers spread over (-1, 1): the fractions of multiples of sqrt(2) and sqrt(3)."""
     k = np.arange(1, count + 1) + 100.0 * start
-    return np.asarray(2.0 * np.mod(k * np.sqrt(2.0) + k * k * np.sqrt(3.0), 1.0) - 1.0)
+    numbers: FloatArray = 2.0 * np.mod(k * np.sqrt(2.0) + k * k * np.sqrt(3.0), 1.0) - 1.0
+    numbers.setflags(write=False)  # they are kept
+    return numbers
