@@ -98,15 +98,15 @@ def verify(  # noqa: PLR0913 -- one parameter an option
         folder = ["--answers", str(answers)] if answers else []
         words = [*folder, *(solver or ()), *context.meta.get(PROGRAM, ())]
         options = CaseOptions(tuple(task or ()), rerun, thorough, seed)
-        shown = Presentation(speaker(language), language, words)
+        presentation = Presentation(speaker(language), language, words)
         finish: Callable[[], int]
         if names or template or export:
-            finish = partial(_list, options, names, template, export, shown.say)
+            finish = partial(_list, options, names, template, export, presentation.say)
         elif self_test:
-            finish = partial(_self_test, [*words, *options.tasks], shown.say)
+            finish = partial(_self_test, [*words, *options.tasks], presentation.say)
         else:
             files = Files(json, junit, html, output)
-            finish = _judge(shown, limits(time_limit, memory_limit), options, files, bar)
+            finish = _judge(presentation, limits(time_limit, memory_limit), options, files, bar)
     return finish()
 
 
