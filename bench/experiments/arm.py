@@ -16,13 +16,13 @@ from ..measure.record import Record
 from ..measure.values import Floats1, Integers1
 from ..problems.chains import BEYOND
 from ..problems.curves import CURVE, FollowedCurve, arm_beyond, arm_curves
-from .chain import BEYOND_TOLERANCE, CHAIN, ChainSolves, SolveWords
+from .chain import BEYOND_TOLERANCE, CHAIN, ChainSolves, SolveFacts
 
 LIMITS = SolverLimits(tolerance=1e-4, max_iterations=100)
 BEYOND_LIMITS = SolverLimits(BEYOND_TOLERANCE, max_iterations=1000)
 
 
-class FollowedMotion(SolveWords, frozen=True):
+class FollowedMotion(SolveFacts, frozen=True):
     """A motion along a curve, (frame,): an outcome is the number of an `Outcome`.
 
     The angles are the rotations of joints from each frame to the next [rad].

@@ -45,7 +45,7 @@ _LEAST_TARGETS = 3
 NO_BALLS = "not asked for chains: it offers no inverse_kinematics"
 
 
-class SolveWords(Values, frozen=True, kw_only=True):
+class SolveFacts(Values, frozen=True, kw_only=True):
     """The tolerance [m] and the most iterations, how a frame starts, the stratum or curve."""
 
     tolerance: Fact[float] = math.nan
@@ -56,7 +56,7 @@ class SolveWords(Values, frozen=True, kw_only=True):
     curve: Fact[str] = ""
 
 
-class ChainSolves(SolveWords, frozen=True):
+class ChainSolves(SolveFacts, frozen=True):
     """The solutions of a batch of targets, (target,); lengths in metres."""
 
     residual: Floats1  # infinite without a solution

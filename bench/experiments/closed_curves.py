@@ -27,7 +27,7 @@ from ..problems.curves import (
     robot_closed_curves,
 )
 from .arm import LIMITS, FollowedMotion, followed, solve_frames
-from .chain import SolveWords
+from .chain import SolveFacts
 
 SUITE = "tracking"
 # The task of records on a curve followed three times, beside `CURVE`.
@@ -41,7 +41,7 @@ STARTS, _SEED = 8, 2014
 ROBOT_SOLVER = "levenberg_marquardt"
 
 
-class DriftAngles(SolveWords, frozen=True):
+class DriftAngles(SolveFacts, frozen=True):
     """The largest angle of a joint from its first pose after each repetition [rad]."""
 
     drift: Floats1

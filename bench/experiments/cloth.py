@@ -38,20 +38,20 @@ FEW_ITERATIONS = (1, 10, 100)  # 10 as in Liu et al. 2013, and a tenth and ten t
 HALVED = tuple(H / 2**i for i in range(-1, 6))
 
 
-class StepWords(Values, frozen=True, kw_only=True):
+class StepFacts(Values, frozen=True, kw_only=True):
     """The number of iterations of a step, where fixed."""
 
     iterations: Fact[int] = 0
 
 
-class IterationErrors(StepWords, frozen=True):
+class IterationErrors(StepFacts, frozen=True):
     """Residual and error of a step at the start and after each iteration, (iteration + 1,)."""
 
     residual: Floats1
     error: Floats1
 
 
-class TruncatedSteps(StepWords, frozen=True):
+class TruncatedSteps(StepFacts, frozen=True):
     """Steps of a few iterations compared with converged steps, (step,): relative error, and [m]."""
 
     error: Floats1

@@ -55,13 +55,13 @@ class ClothDrawing(Values, frozen=True):
     pinned: Integers1
 
 
-class MovingWords(Values, frozen=True, kw_only=True):
+class MovingFacts(Values, frozen=True, kw_only=True):
     """The position of a motion in the order."""
 
     order: Fact[int]
 
 
-class MovingArm(MovingWords, frozen=True):
+class MovingArm(MovingFacts, frozen=True):
     """The arm's joints [m], (frame, joint, 3), the curve, and the error of each frame [m]."""
 
     positions: Floats3
@@ -69,7 +69,7 @@ class MovingArm(MovingWords, frozen=True):
     error: Floats1
 
 
-class MovingCloth(MovingWords, frozen=True):
+class MovingCloth(MovingFacts, frozen=True):
     """A cloth's particles [m], (frame, particle, 3), the error of each [m], the pins."""
 
     h: float  # the step [s]
