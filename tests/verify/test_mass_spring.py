@@ -127,15 +127,17 @@ def extended_position_based(**inputs):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures("without_changed_lines")
 def test_of_a_step_that_is_unknown_the_nearest_and_what_holds_are_told():
     judged = report(extended_position_based)
     assert judged.verdict is Verdict.UNDECIDED
     nearest, holds = map(str, judged.diagnosis.hints)
-    assert re.search(r"nearest known step is \d+ local/global iterations from s_n", nearest)
+    assert nearest.startswith("The nearest known step is ")
+    assert '"method": "position_based"' in nearest
     median, worst = (float(x) for x in re.search(r"by (\S+) in .* by (\S+) in", nearest).groups())
     assert 0.0 < median <= worst < 0.1
     laws_that_hold = set(holds.removesuffix(".").partition(": ")[2].split(", "))
-    assert laws_that_hold == {"pins", "momentum", "equal answers", "symmetry", "consistency"}
+    assert laws_that_hold >= {"pins", "momentum", "equal answers", "symmetry", "consistency"}
     screen = " ".join(" ".join(terminal.lines(
         Report(Greeting(1, ("mass_spring_step",)), [judged], 0),
         Presentation(speaker("en"), "en", ["x.py"]),

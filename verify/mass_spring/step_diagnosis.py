@@ -20,7 +20,7 @@ from .model_search import Probe, gap_of, honest_options
 from .position_based import DECLARATION
 from .stepping import Recognition, describe_model, recognise
 
-# The number of small cases in which the nearest step is sought.
+# The number of small cases in which the nearest step is sought: the last, where methods differ.
 COMPARED = 4
 # A step that differs by a larger share of the displacement has nothing to say about the answers.
 NEAR = 0.1
@@ -101,7 +101,7 @@ def _nearest(telling: Sequence[Probe], recognition: Recognition) -> Sentence | N
         if compatible(step):
             options = tuple(step.values())
             gaps = [
-                gap_of(model_of(options), probe, greeting.epsilon) for probe in telling[:COMPARED]
+                gap_of(model_of(options), probe, greeting.epsilon) for probe in telling[-COMPARED:]
             ]
             known = [gap for gap in gaps if gap is not None] or [np.inf]
             steps.append((float(np.median(known)), max(known), options))
