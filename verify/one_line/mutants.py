@@ -9,6 +9,7 @@ import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from functools import cache, cached_property
 from types import FunctionType
 from typing import Any, NamedTuple, TypeVar
 
@@ -73,23 +74,18 @@ class Program:
     def __init__(self, source: str) -> None:
         self.source = source
         self.choices: Mapping[str, Any] = {}  # the values of constants that were chosen
-        self._tree = ast.parse(source)
-        for loop in ast.walk(self._tree):
-            if isinstance(loop, ast.For | ast.While):
-                loop.body.insert(0, ast.Expr(parsed(f"{PASS}()")))
-        for function in self._functions:
-            if function.name in ENTRIES:
-                names = [arg.arg for arg in function.args.args]
-                function.body[:0] = ast.parse("\n".join(f"{n} = {n}" for n in names)).body
-        ast.fix_missing_locations(self._tree)
         self.names: dict[str, Any] = {PASS: self._pass}
         self._passes, self._max_passes = 0, UNLIMITED
         self.mutant_count = 0  # of those that were made
         self._scopes: dict[str, Scope] = {}  # of the functions that were observed
         self._lines = set[int]()  # that were executed
-        exec(_compiled(self._tree), self.names)
+        exec(_code_of(source), self.names)
         if "np" in self.names:
             self.names["np"] = FastNumpy()
+
+    @cached_property
+    def _tree(self) -> ast.Module:
+        return _tree_of(self.source)
 
     def choose(self, constants: Mapping[str, Any]) -> None:
         """Give constants of the program other values."""
@@ -246,6 +242,24 @@ class Program:
             exec(_compiled(ast.Module([function], [])), self.names, names)
             self.mutant_count += 1
             yield Mutant(kind, function.name, right, wrong, names[function.name])
+
+
+def _tree_of(source: str) -> ast.Module:
+    """Return a program that counts the passes through its loops, and reads its inputs in lines."""
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
+        if isinstance(node, ast.For | ast.While):
+            node.body.insert(0, ast.Expr(parsed(f"{PASS}()")))
+    for part in tree.body:
+        if isinstance(part, ast.FunctionDef) and part.name in ENTRIES:
+            names = [arg.arg for arg in part.args.args]
+            part.body[:0] = ast.parse("\n".join(f"{n} = {n}" for n in names)).body
+    return ast.fix_missing_locations(tree)
+
+
+@cache  # programs are run in many choices
+def _code_of(source: str) -> Any:
+    return _compiled(_tree_of(source))
 
 
 def _expressions(node: ast.AST) -> Iterator[tuple[ast.AST, Any, Any]]:

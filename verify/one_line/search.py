@@ -151,8 +151,9 @@ def changed_lines(
             entry for entry in proposals.entries
             if not is_known or all(part.codes for part in parts_of(entry))
         ]  # fmt: skip
-        looked_up = {source_of(name) for names in IN_DICTIONARY.values() for name in names}
-        others = [program for program in programs if program.source not in looked_up]
+        names = (name for names in IN_DICTIONARY.values() for name in names)
+        in_dictionary = {_functions_of(source_of(name)) for name in names}
+        others = [p for p in programs if _functions_of(p.source) not in in_dictionary]
         best = of_entries(entries, evidence, greeting)
         best = best or _of_programs(others, evidence, is_known=True)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -177,6 +178,11 @@ def _evidence(
     compared = without_near(compared, report, tolerance)
     is_motion = report.task == tool_steps.MOTIONS
     return Evidence(report, compared[: tool_steps.MAX_MOTIONS if is_motion else None], tolerance)
+
+
+def _functions_of(source: str) -> str:
+    """Return the functions of a program, without the constants that are its choices."""
+    return source[source.index("\ndef ") :]
 
 
 def _as_proposed(evidence: Evidence, proposals: Proposals) -> Evidence:
