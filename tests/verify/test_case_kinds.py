@@ -93,6 +93,21 @@ def test_zeros_and_both_signs_of_a_stretch_are_asked(task, misreading):
         assert names <= wrong_cases(report)
 
 
+def test_a_division_by_stiffnesses_is_told_where_they_are_zero():
+    def step(masses, springs, stiffnesses, positions, velocities, gravity, h, **request):
+        with np.errstate(all="ignore"):
+            compliances = 1.0 / stiffnesses
+            pulls = 0.0 * compliances  # NaN where a stiffness is 0
+        v = velocities + h * gravity + pulls.sum()
+        return {"positions": positions + h * v, "velocities": v}
+
+    connection = FunctionConnection({"mass_spring_step": step}, Greeting(1, ("mass_spring_step",)))
+    (report,) = verify(connection, ["mass_spring_step"]).tasks
+    assert report.verdict is Verdict.BROKEN
+    words = str(report.diagnosis.explanations[0].sentence)
+    assert words.startswith("Where stiffnesses are 0 its answers are not finite")
+
+
 def test_energies_that_are_infinite_somewhere_are_wrong_and_named():
     def infinite(**inputs):
         is_zero = inputs["rest_lengths"].min() == 0.0

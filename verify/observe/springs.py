@@ -167,7 +167,7 @@ def _add_pulls(name: str, solved: Sequence[Pulls], evidence: Findings) -> None:
         evidence.statements.append(_of_fit(sentence(
             "Every spring pulls {formula} {place}; right is {right} (k: stiffness, l: length, r: "
             "rest length, c: damping; {count} springs of {cases} cases, solved from the answers).",
-            formula=formula(fitted), right=formula([Term(c, s) for s, c in right[0].items()]),
+            formula=formula(fitted), right=formula(_nearest(right, fitted)),
             **count)))  # fmt: skip
     elif count["place"] in (READINGS["forces"], READINGS["start"]):
         # at the end of a step iterations may not have converged: then no sum is exact
@@ -185,6 +185,13 @@ def _right_pulls(name: str, terms: Mapping[str, FloatArray]) -> list[Mapping[str
     if name == "forces":
         return [rate if terms["c"].any() else elastic]
     return [elastic, rate, change]
+
+
+def _nearest(sums: Sequence[Mapping[str, float]], fitted: Sequence[Term]) -> list[Term]:
+    """Return the right sum with most of the terms of a fitted sum, the usual sum of equals."""
+    symbols = {term.symbol for term in fitted}
+    nearest = max(sums, key=lambda due: len(symbols & due.keys()))
+    return [Term(coefficient, symbol) for symbol, coefficient in nearest.items()]
 
 
 def _of_fit(words: Sentence) -> Statement:
@@ -236,6 +243,7 @@ def _differ(cases: Sequence[SpringCase]) -> bool:
 def _add_flights(cases: Sequence[SpringCase], evidence: Findings, substeps: int) -> None:
     """Add what moves free particles without springs."""
     declared = [{"h v": 1.0, "h² g": share} for share in _gravity_shares(substeps)]
+    right = {"x' - x": declared} if substeps > 1 else {}
     if not _differ(cases):
         return
     for name, quantity, symbols, dues in FLIGHTS:
@@ -244,7 +252,8 @@ def _add_flights(cases: Sequence[SpringCase], evidence: Findings, substeps: int)
         fitted = _sum_of(cases, quantity, symbols)
         if fitted is None:
             continue
-        if any(is_sum(fitted, due) for due in (*dues, *declared)):
+        dues = right.get(name, dues)
+        if any(is_sum(fitted, due) for due in dues):
             words = sentence("{name} without springs ({count} cases)", name=name, count=len(cases))
             evidence.right.append(words)
             continue

@@ -24,6 +24,8 @@ MIN_DIGITS, MAX_DIGITS = 4, 14
 SINGLE, CORRECT = (8, 9), (5.0, 9.0)
 # Single precision keeps lengths to about 1e-7, double precision to much less.
 EXACT = 1e-11
+# Fewer answers that single precision excuses may be of stiff cases, which enlarge rounding.
+MIN_FORGIVEN = 3
 AS_SINGLE = sentence(
     "Judged in single precision: all its numbers are single-precision values. Declare it with "
     '"precision": "single" in the greeting (of a Python file, in PLUMBOB).'
@@ -117,6 +119,8 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         if before.verdict >= Verdict.WRONG > after.verdict
     ]
     is_right = single.verdict <= Verdict.RIGHT_EXCEPT
+    if not is_right and len(forgiven) < MIN_FORGIVEN:
+        return report
     if not are_off_by_single(report.judgements if is_right else forgiven):
         return report
     return replace(single, assumptions=(INEXACT,))

@@ -29,13 +29,21 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
         return report
     for name in NAMES:
         concerned = [j for j in wrong if _has_zeros(j, name)]
-        if not concerned or not _jumps(examination.connection, concerned, name):
+        if not concerned:
             continue
-        words = sentence(
-            "Where {name} are 0 its answers are not those of almost 0: it takes 0 for a missing "
-            "number, as {name} || 1 or {name} or 1 does. Test whether the number is missing.",
-            name=name,
-        )
+        if _divides(examination.connection, concerned, name):
+            words = sentence(
+                "Where {name} are 0 its answers are not finite, and with almost 0 they are: it "
+                "divides by these numbers. Leave springs with 0 out of the division.", name=name
+            )  # fmt: skip
+        elif _jumps(examination.connection, concerned, name):
+            words = sentence(
+                "Where {name} are 0 its answers are not those of almost 0: it takes 0 for a "
+                "missing number, as {name} || 1 or {name} or 1 does. Test whether the number is "
+                "missing.", name=name
+            )  # fmt: skip
+        else:
+            continue
         share = len(concerned) / len(wrong)
         explanation = Explanation((f"zero {name}",), words, share, 0.0)
         diagnosis = replace(
@@ -49,6 +57,23 @@ def examine(examination: Examination, report: TaskReport) -> TaskReport:
 def _has_zeros(judgement: CaseJudgement, name: str) -> bool:
     values = judgement.case.inputs.get(name)
     return values is not None and np.size(values) > 0 and not np.all(values)
+
+
+def _divides(connection: Connection, judgements: Sequence[CaseJudgement], name: str) -> bool:
+    """Return whether answers with zeros are not finite, and answers with almost zeros are."""
+    judgements = [j for j in judgements if not _is_finite(getattr(j.answer, "values", {}))]
+    for judgement in judgements[:TRIALS]:
+        values = np.asarray(judgement.case.inputs[name])
+        almost = outputs_of(
+            connection, judgement.case, {name: np.where(values == 0.0, ALMOST, values)}
+        )
+        if not almost or not _is_finite(almost):
+            return False
+    return bool(judgements)
+
+
+def _is_finite(outputs: Mapping[str, Any]) -> bool:
+    return all(np.isfinite(values).all() for values in outputs.values())
 
 
 def _jumps(connection: Connection, judgements: Sequence[CaseJudgement], name: str) -> bool:
