@@ -94,15 +94,13 @@ def test_zeros_and_both_signs_of_a_stretch_are_asked(task, misreading):
 
 
 def test_a_division_by_stiffnesses_is_told_where_they_are_zero():
-    def step(masses, springs, stiffnesses, positions, velocities, gravity, h, **request):
+    def dividing(**inputs):
         with np.errstate(all="ignore"):
-            compliances = 1.0 / stiffnesses
-            pulls = 0.0 * compliances  # NaN where a stiffness is 0
-        v = velocities + h * gravity + pulls.sum()
-        return {"positions": positions + h * v, "velocities": v}
+            loss = (0.0 / inputs["stiffnesses"]).sum()  # NaN where a stiffness is 0
+        return {name: values + loss for name, values in RIGHT[STEP](**inputs).items()}
 
-    connection = FunctionConnection({"mass_spring_step": step}, Greeting(1, ("mass_spring_step",)))
-    (report,) = verify(connection, ["mass_spring_step"]).tasks
+    greeting = Greeting(1, (STEP,), step=Step("symplectic", damper="explicit"))
+    (report,) = verify(FunctionConnection({STEP: dividing}, greeting), [STEP]).tasks
     assert report.verdict is Verdict.BROKEN
     words = str(report.diagnosis.explanations[0].sentence)
     assert words.startswith("Where stiffnesses are 0 its answers are not finite")
