@@ -39,7 +39,7 @@ TOLERANCES = {"double": (1e-6,), "single": (1e-4, 1e-3)}
 # Equal requests get answers that differ by less, but for threads that add up in another order.
 SAME = 1e-6
 # The most candidates, which all cases have to decide between, and the most pairs of changes.
-MAX_CANDIDATES, MAX_PAIRS = 200, 40
+MAX_CANDIDATES, MAX_PAIRS = 200, 12
 UNSTEADY = sentence(
     "Equal requests got different answers, also after a new start: no changed line is looked up."
 )

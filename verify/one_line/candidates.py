@@ -156,7 +156,8 @@ def of_entries(
     by_program = dict[str, list[Entry | ChangePair]]()
     for entry in entries:
         by_program.setdefault(parts_of(entry)[0].program, []).append(entry)
-    for kind in (list, _pairs):
+    # programs of steps have many choices: only pairs are tried whose keys add up
+    for kind in (list,) if evidence.report.task in OF_STEPS else (list, _pairs):
         for name, changes in by_program.items():
             for program in in_choices(name, greeting.step):
                 explanations = _of_changes(program, kind(changes), evidence)
