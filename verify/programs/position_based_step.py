@@ -2,7 +2,7 @@
 
 import numpy as np
 
-PLUMBOB = {}
+PLUMBOB = {"step": {"method": "position_based"}}
 COMPLIANT, SWEEPS = False, 1
 
 
