@@ -28,6 +28,7 @@ MIN_DIFFERENT = 3
 # Cases with more passes of a right program through its loops are left out for their time, unless a
 # pass is along a curve. A known fault may have additional loops.
 MAX_PASSES, OF_CURVES = 200, 2000
+ALONG_CURVES = ("resample", "robot_track")
 # Cases stay if the shortest case has as many passes, like a constant number of sweeps.
 LONGER = 3
 # A wrong answer within so many tolerances of the right answer would fit too many causes.
@@ -160,7 +161,7 @@ def compare(
     passes, different, same = dict[str, int](), list[Exchange](), list[Exchange]()
     for exchange, (right, count) in zip(compared, answers, strict=True):
         assert isinstance(exchange.answer, Answer)
-        is_curve = exchange.case.task == "resample"
+        is_curve = exchange.case.task in ALONG_CURVES
         if count <= (OF_CURVES if is_curve else most):
             passes[exchange.case.name] = count
             is_same = difference(right, exchange.answer.values) <= tolerance
