@@ -104,7 +104,7 @@ def _dictionary(task: str, method: str) -> Dictionary:
     return dictionary
 
 
-class Table(NamedTuple):
+class KeyTable(NamedTuple):
     """A dictionary, and the keys of a solver's answers."""
 
     dictionary: Dictionary
@@ -114,7 +114,7 @@ class Table(NamedTuple):
     output_count: int  # of the first outputs, which are compared
     is_additive: bool  # whether mistakes in two terms change an answer by a sum
 
-    def of_first_outputs(self, count: int) -> "Table":
+    def of_first_outputs(self, count: int) -> "KeyTable":
         """Return the table of the first outputs alone."""
         return self._replace(rows=self.rows[:, :count], output_count=count)
 
@@ -133,7 +133,7 @@ def _table(
     method: str,
     cases: Sequence[Case],
     answers: Sequence[Answer | Failure],
-) -> Table:
+) -> KeyTable:
     """Return the keys of a solver's answers, NaN of requests that are not sent."""
     base, all_cases = Program(source_of(IN_DICTIONARY[method or task][0])), requests(task, method)
     names = [case.name for case in all_cases]
@@ -141,12 +141,12 @@ def _table(
     for case, answer in zip(cases, answers, strict=True):
         rows[names.index(case.name)] = _keys_of(answer, case, base, method)
     solves = list(map(is_solve, all_cases))
-    return Table(
+    return KeyTable(
         dictionary, rows, solves, right_keys(task, method), len(OUTPUTS[task]), task in OF_SPRINGS
     )
 
 
-def _candidates(tables: Sequence[Table], tolerance: float) -> list[Entry | ChangePair]:
+def _candidates(tables: Sequence[KeyTable], tolerance: float) -> list[Entry | ChangePair]:
     """Return the likeliest of the entries that match rows of keys, and sums of two if none does."""
     ranks = [pair for table in tables for pair in _matches(table, tolerance)]
     ranks.sort(key=lambda pair: (pair[0], likelihood(pair[1])))
@@ -180,7 +180,7 @@ def _keys_of(answer: Answer | Failure, case: Case, base: Program, method: str) -
     return keys(outputs.values, answer_of(base, method, case), case)
 
 
-def _matches(table: Table, tolerance: float) -> list[tuple[int, Entry]]:
+def _matches(table: KeyTable, tolerance: float) -> list[tuple[int, Entry]]:
     """Return the entries with the keys of all answered requests, or (1) of a single wrong one.
 
     An entry with wrong single sweeps has no keys of solves.
@@ -197,7 +197,7 @@ def _matches(table: Table, tolerance: float) -> list[tuple[int, Entry]]:
     return [(int(not every[i]), entries[i]) for i in numbers]
 
 
-def two_changes(table: Table, tolerance: float) -> list[ChangePair]:
+def two_changes(table: KeyTable, tolerance: float) -> list[ChangePair]:
     """Return the two changes of a program, the likeliest first, that together have all keys.
 
     Terms of forces add up, and so do keys of mistakes in different terms: what both change is the

@@ -153,7 +153,11 @@ def changed_lines(
         ]  # fmt: skip
         names = (name for names in IN_DICTIONARY.values() for name in names)
         in_dictionary = {_functions_of(source_of(name)) for name in names}
-        others = [p for p in programs if _functions_of(p.source) not in in_dictionary]
+        others = [
+            program
+            for program in programs
+            if _functions_of(program.source) not in in_dictionary or _has_other_numbers(program)
+        ]
         best = of_entries(entries, evidence, greeting)
         best = best or _of_programs(others, evidence, is_known=True)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -183,6 +187,13 @@ def _evidence(
 def _functions_of(source: str) -> str:
     """Return the functions of a program, without the constants that are its choices."""
     return source[source.index("\ndef ") :]
+
+
+def _has_other_numbers(program: Program) -> bool:
+    """Return whether a declared number of substeps or iterations is not that of the text."""
+    numbers = {name: n for name, n in program.choices.items() if isinstance(n, int)}
+    own = Program(program.source).names
+    return any(own[name] != number for name, number in numbers.items())
 
 
 def _as_proposed(evidence: Evidence, proposals: Proposals) -> Evidence:
