@@ -264,14 +264,24 @@ def of_numbers(program: Program, evidence: Evidence) -> tuple[Explanation, ...]:
     if len(right.different) < MIN_DIFFERENT:
         return ()
     program.observe(partial(run, right.different[0].case))
-    mutants = dict[str, Mutant]()
+    mutants, certain = dict[str, Mutant](), set[str]()
+    if not _vary(right.different):
+        return ()
 
     def variants() -> Iterator[Variant]:
         exchanges, passes = right.different, right.passes
         for mutant, number in constants.fitted(program, run, exchanges, passes, evidence.tolerance):
             key = str(len(mutants))
             mutants[key] = text_of(mutant, number)
+            certain.update([key] if constants.is_fraction(number) else [])
             predict = partial(with_number, program, mutant, number, passes, run)
             yield Variant((key,), predict, is_special=True)
 
-    return right.explain(variants(), partial(changes_in_words, mutants))
+    explanations = right.explain(variants(), partial(changes_in_words, mutants))
+    return tuple(e for e in explanations if e.share == 1.0 or certain & {*e.faults})
+
+
+def _vary(exchanges: Sequence[Exchange]) -> bool:
+    """Return whether requests differ in their masses, which a fitted number may hide."""
+    masses = [np.ravel(e.case.inputs.get("masses", i)) for i, e in enumerate(exchanges)]
+    return any(not np.array_equal(masses[0], other) for other in masses)

@@ -98,3 +98,8 @@ def _simple(number: float) -> float:
     """Return a very near fraction of a small denominator, or the number."""
     fraction = float(Fraction(number).limit_denominator(DENOMINATOR))
     return fraction if abs(fraction - number) <= NEAR * max(1.0, abs(number)) else number
+
+
+def is_fraction(number: float) -> bool:
+    """Return whether a fitted number is a fraction of a small denominator."""
+    return float(Fraction(number).limit_denominator(DENOMINATOR)) == number

@@ -11,7 +11,7 @@ from ..exchange import Answer, Connection
 from ..explain import MORE
 from ..fault_programs import IN_DICTIONARY, source_of
 from ..gaps import difference
-from ..greeting import Greeting
+from ..greeting import Greeting, Step
 from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from ..kinematics.claims import OF_POSES
 from ..kinematics.early_ends import EARLY_ENDS
@@ -151,13 +151,7 @@ def changed_lines(
             entry for entry in proposals.entries
             if not is_known or all(part.codes for part in parts_of(entry))
         ]  # fmt: skip
-        names = (name for names in IN_DICTIONARY.values() for name in names)
-        in_dictionary = {_functions_of(source_of(name)) for name in names}
-        others = [
-            program
-            for program in programs
-            if _functions_of(program.source) not in in_dictionary or _has_other_numbers(program)
-        ]
+        others = _beyond_dictionaries(programs, greeting.step)
         best = of_entries(entries, evidence, greeting)
         best = best or _of_programs(others, evidence, is_known=True)
         # Answers that are right to all requests of the dictionary are wrong in special cases.
@@ -189,11 +183,25 @@ def _functions_of(source: str) -> str:
     return source[source.index("\ndef ") :]
 
 
-def _has_other_numbers(program: Program) -> bool:
-    """Return whether a declared number of substeps or iterations is not that of the text."""
-    numbers = {name: n for name, n in program.choices.items() if isinstance(n, int)}
+def _beyond_dictionaries(programs: Sequence[Program], step: Step) -> list[Program]:
+    """Return the programs whose changes are in no dictionary, or with other choices there."""
+    names = (name for names in IN_DICTIONARY.values() for name in names)
+    functions = {_functions_of(source_of(name)) for name in names}
+    return [
+        program
+        for program in programs
+        if _functions_of(program.source) not in functions or _has_other_choices(program, step)
+    ]
+
+
+def _has_other_choices(program: Program, step: Step) -> bool:
+    """Return whether a number, or a declared choice, is not that of the program's text."""
     own = Program(program.source).names
-    return any(own[name] != number for name, number in numbers.items())
+    return any(
+        own[name] != choice
+        and (isinstance(choice, int) or getattr(step, name.lower(), None) is not None)
+        for name, choice in program.choices.items()
+    )
 
 
 def _as_proposed(evidence: Evidence, proposals: Proposals) -> Evidence:

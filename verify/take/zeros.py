@@ -14,7 +14,7 @@ from ..judgement import CaseJudgement, Explanation, TaskReport, Verdict
 from .examination import TRIALS, Examination, is_steady, outputs_of
 
 # Inputs of springs with possible zeros.
-NAMES = ("stiffnesses", "dampings")
+NAMES = ("stiffnesses", "dampings", "rest_lengths")
 # Almost zero. The change of right answers is about this share of the change by 1 in its place.
 # Other answers change as by another number.
 ALMOST, JUMP = 1e-6, 1e-2
