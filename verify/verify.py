@@ -185,7 +185,9 @@ class Attempt:
         diagnose = partial(self._diagnosis, search, is_placed)
         report = search.run(lambda: _with_diagnosis(verdict, diagnose), verdict)
         if not causes and report.greeting is not None:
-            find_line = partial(with_changed_line, report, report.greeting, self.connection)
+            is_stuck = any(is_hung(exchange.answer) for exchange in report.exchanges)
+            connection = None if is_stuck else self.connection  # a stuck solver is asked no more
+            find_line = partial(with_changed_line, report, report.greeting, connection)
             report = search.run(find_line, report)
             original = report.original
             if original is not None and not report.diagnosis.explained:

@@ -339,7 +339,7 @@ class Rung(NamedTuple):
 def step_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a step of a frame, from cheap to expensive."""
     if peer.run.kind == ITERATED:
-        return [_rung(peer, counted(n, "iteration"), iterations=n) for n in peer.run.ladder]
+        return [_rung(peer, _counted(n, "iteration"), iterations=n) for n in peer.run.ladder]
     return [_rung(peer, "1 step", substeps=1)]
 
 
@@ -347,19 +347,23 @@ def motion_rungs(peer: Peer, frequency: float) -> list[Rung]:
     """Return the rungs for a motion: steps of part of a frame, which are nearer to the truth."""
     stable = [explicit_substeps(frequency, margin) for margin in MARGINS]
     substeps = {EXPLICIT: stable, LINEARISED: PARTS, UNDECLARED: sorted({*PARTS, *stable})}
-    rungs = [_rung(peer, counted(n, "step"), substeps=n) for n in substeps.get(peer.run.kind, ())]
+    rungs = [_rung(peer, _counted(n, "step"), substeps=n) for n in substeps.get(peer.run.kind, ())]
     for n, iterations in peer.run.motion:
-        name = f"{counted(n, 'step')} of {counted(iterations, 'iteration')}"
+        name = f"{_counted(n, 'step')} of {_counted(iterations, 'iteration')}"
         rungs.append(_rung(peer, name, substeps=n, iterations=iterations))
     if peer.run.converges:
         for n in PARTS:
-            name = f"{counted(n, 'step')} to {RESIDUAL_LABEL}"
+            name = f"{_counted(n, 'step')} to {RESIDUAL_LABEL}"
             rungs.append(_rung(peer, name, tolerance=RESIDUAL, substeps=n))
     return rungs
 
 
 def _rung(peer: Peer, name: str, **settings: float) -> Rung:
     return Rung(name, {**peer.run.settings, **peer.spec, **settings})
+
+
+def _counted(count: int, name: str) -> str:
+    return f"{count:,} {name}{'' if count == 1 else 's'}"
 
 
 # The notes on unfinished solvers, by their titles and the number of particles.

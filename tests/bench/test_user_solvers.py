@@ -268,7 +268,7 @@ def test_a_seed_draws_other_targets_and_is_on_record(folder):
         distances += [tuple(one.measured["distance"]) for one in records("ccd")]
     assert distances[0] != distances[1]
     assert bench("ik", *words, "--seed", "-1") == 2
-    for seed, expected in ((None, 1986), (7, 7)):
+    for seed, expected in {None: 1986, 7: 7}.items():
         request = MeasurementRequest(problems=["robots/fetch"], seed=seed)
         scale = choose(["ik"], "quick", request).scale
         fetch = [one for one in blocks("ik", scale) if one.problem == "robots/fetch"]

@@ -1,8 +1,8 @@
 """Position-based steps: free flight, then projections that bring springs nearer to their lengths.
 
-They are Verlet with sweeps of constraints (Jakobsen 2001), position-based dynamics (PBD, Müller et
-al. 2007) and its extended form (XPBD, Macklin et al. 2016). Answers depend on the order of springs,
-on compliances and on the number of sweeps, so none are predicted: laws that need no model judge
+They are Verlet with sweeps of constraints (Jakobsen 2001), position-based dynamics (Müller et al.
+2007; PBD) and its extended form (Macklin et al. 2016; XPBD). Answers depend on the order of
+springs, compliances and the number of sweeps, so none are predicted: laws that need no model judge
 them. With s the end of free flight, u a spring's direction and x' the answer, a single spring moves
 its ends along u, and leaves a share between 0 and 1 of l(s) - r.
 """
