@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from plumbob.text.sentence import sentence
+from plumbob.verify.dictionary.look_up import Proposals
 from plumbob.verify.exchange import Answer, Exchange
 from plumbob.verify.fault_programs import (
     FAMILIES,
@@ -17,7 +18,7 @@ from plumbob.verify.fault_programs import (
     source_of,
 )
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
-from plumbob.verify.judgement import Explanation, Verdict
+from plumbob.verify.judgement import Diagnosis, Explanation, TaskReport, Verdict
 from plumbob.verify.one_line import answers, right_programs, search, sentences
 from plumbob.verify.one_line.mutants import Mutant, Program
 from plumbob.verify.screen import terminal
@@ -31,6 +32,14 @@ def report_on(source, task):
     ((task, method),) = trials(connection.greeting, [task])
     cases = DISCIPLINES[task].cases(connection.greeting, method, 0, False)
     return judge_cases(connection, task, method, cases), connection.greeting
+
+
+def test_an_unknown_step_with_right_answers_to_the_dictionary_has_no_name(monkeypatch):
+    monkeypatch.setattr(search, "look_up", lambda *arguments: Proposals(is_wrong=False))
+    monkeypatch.delattr(search, "changed_lines")  # an XPBD step, as a right one of its method
+    report = TaskReport("mass_spring_step", "", [], Diagnosis())
+    assert report.verdict is Verdict.UNDECIDED
+    assert search.with_changed_line(report, Greeting(PROTOCOL, ()), object()) is report
 
 
 def changed_lines(source, task):

@@ -80,6 +80,9 @@ def with_changed_line(
             if proposals.hint == UNSTEADY:
                 return report
             proposals = None  # without a dictionary all lines are searched
+    is_undecided = report.verdict is Verdict.UNDECIDED
+    if is_undecided and proposals is not None and not proposals.is_wrong:
+        return report  # a method that no right program has, and nothing shows a mistake
     if known_alone and proposals is None:
         return report
     if report.task in tool_steps.SOLVES:
