@@ -69,21 +69,8 @@ def with_changed_line(
         if named or not doubtful:
             return report
         share = 1.0
-    proposals = None
-    # a step of no declared method is undecided if no known step answers so
-    least = Verdict.UNDECIDED if report.task in OF_STEPS else Verdict.WRONG
-    if connection is not None and report.verdict >= least:
-        proposals = look_up(connection, report.task, report.method, greeting)
-        if proposals is not None and proposals.hint is not None:
-            hints = (*report.diagnosis.hints, proposals.hint)
-            report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
-            if proposals.hint == UNSTEADY:
-                return report
-            proposals = None  # without a dictionary all lines are searched
-    is_undecided = report.verdict is Verdict.UNDECIDED
-    if is_undecided and proposals is not None and not proposals.is_wrong:
-        return report  # a method that no right program has, and nothing shows a mistake
-    if known_alone and proposals is None:
+    report, proposals, is_over = _looked_up(report, greeting, connection)
+    if is_over or (known_alone and proposals is None):
         return report
     if report.task in tool_steps.SOLVES:
         explanations = _of_steps(report, greeting, is_known)
@@ -94,6 +81,24 @@ def with_changed_line(
     hints = () if explanations[0].share == 1.0 else report.diagnosis.hints
     diagnosis = replace(report.diagnosis, explanations=explanations, first_broken=None, hints=hints)
     return replace(report, diagnosis=diagnosis)
+
+
+def _looked_up(
+    report: TaskReport, greeting: Greeting, connection: Connection | None
+) -> tuple[TaskReport, Proposals | None, bool]:
+    """Return the report with the hint of a look-up, what it proposes, and whether that is all."""
+    # a step of no declared method is undecided if no known step answers so
+    least = Verdict.UNDECIDED if report.task in OF_STEPS else Verdict.WRONG
+    if connection is None or report.verdict < least:
+        return report, None, False
+    proposals = look_up(connection, report.task, report.method, greeting)
+    if proposals is None or proposals.hint is None:
+        is_unknown = proposals is not None and not proposals.is_wrong
+        # a method that no right program has, and nothing shows a mistake
+        return report, proposals, is_unknown and report.verdict is Verdict.UNDECIDED
+    hints = (*report.diagnosis.hints, proposals.hint)
+    report = replace(report, diagnosis=replace(report.diagnosis, hints=hints))
+    return report, None, proposals.hint == UNSTEADY  # without a dictionary all lines are searched
 
 
 def _of_steps(report: TaskReport, greeting: Greeting, is_known: bool) -> tuple[Explanation, ...]:
