@@ -27,14 +27,16 @@ from kinematics_solvers import (
 
 from plumbob.reference import IK_SOLVERS, resample, rotation
 from plumbob.text.sentence import codes_in
+from plumbob.verify.functions import FunctionConnection
 from plumbob.verify.greeting import Fixed, Greeting
 from plumbob.verify.judgement import Verdict
 from plumbob.verify.kinematics import honest, sweeps
 from plumbob.verify.kinematics.polylines import Polyline
 from plumbob.verify.kinematics.predictions import solve
 from plumbob.verify.kinematics.textbook import Choices
-from plumbob.verify.verify import DISCIPLINES
+from plumbob.verify.verify import DISCIPLINES, judge_cases
 
+ONE_METHOD = Greeting(1, (INVERSE,), methods=("ccd",))
 RIGHT, RIGHT_EXCEPT, WRONG = Verdict.RIGHT, Verdict.RIGHT_EXCEPT, Verdict.WRONG
 HONEST_CHOICES = [(m, choice) for m in METHODS for choice in honest.HONEST[m]]
 
@@ -57,7 +59,10 @@ def test_honest_choice_is_told_and_right(method, choice):
 )
 @pytest.mark.usefixtures("verdict_alone")
 def test_fault_breaks_a_law_of_its_own(code, law):
-    assert law in broken(judged(INVERSE, faulty(INVERSE, code), "ccd"))
+    connection = FunctionConnection({INVERSE: faulty(INVERSE, code)}, ONE_METHOD)
+    cases = DISCIPLINES[INVERSE].cases(ONE_METHOD, "ccd", 0, False)
+    cases = [case for case in cases if case.name.startswith("one sweep")]
+    assert law in broken(judge_cases(connection, INVERSE, "ccd", cases))
 
 
 @pytest.mark.usefixtures("verdict_alone")

@@ -18,6 +18,7 @@ from plumbob.verify.laws import finding
 from plumbob.verify.verify import _with_cause, verify
 
 
+@pytest.mark.sample("fabrik")
 @pytest.mark.parametrize("method", METHODS)
 def test_a_solver_that_stands_on_wrong_forward_kinematics_is_told_its_mistake(method):
     code = "PB-FK-003"

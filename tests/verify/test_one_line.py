@@ -19,7 +19,7 @@ from plumbob.verify.fault_programs import (
 )
 from plumbob.verify.greeting import PROTOCOL, Greeting, Step
 from plumbob.verify.judgement import Diagnosis, Explanation, TaskReport, Verdict
-from plumbob.verify.one_line import answers, right_programs, search, sentences
+from plumbob.verify.one_line import answers, candidates, right_programs, search, sentences
 from plumbob.verify.one_line.mutants import Mutant, Program
 from plumbob.verify.screen import terminal
 from plumbob.verify.screen.words import Presentation, speaker
@@ -255,8 +255,9 @@ def test_a_missing_placement_is_told_for_programs_that_keep_positions():
     ],
 )  # fmt: skip
 def test_a_number_is_fitted_to_the_answers(right, wrong, words):
-    source = source_of("forces").replace(right, wrong)
-    (explanation, *_) = changed_lines(source, "mass_spring_forces")
+    report, greeting = report_on(source_of("forces").replace(right, wrong), "mass_spring_forces")
+    evidence = search._evidence(report, greeting, ())
+    (explanation, *_) = candidates.of_numbers(Program(source_of("forces")), evidence)
     assert explanation.share == 1.0
     assert words in str(explanation.sentence)
 
