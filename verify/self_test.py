@@ -20,7 +20,7 @@ from .verify import verify
 
 HONEST = "honest solvers"
 # Mistakes with the answers of another mistake, which is named in their place.
-EQUAL = {"PB-TRACK-021": "PB-TRACK-006"}
+EQUAL = {"PB-TRACK-021": "PB-TRACK-006", "PB-CCD-030": "PB-TRACK-020"}
 # The families whose codes stand for many changes of a line, and for state of the process.
 WITHOUT_PROGRAMS = ("LINE", "STATE")
 
