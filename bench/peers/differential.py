@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from plumbob.reference import rotation
-from plumbob.reference.inverse_kinematics.jacobian_methods import LEANING, PHASES
+from plumbob.reference.inverse_kinematics.jacobian import LEANING, PHASES
 from plumbob.reference.inverse_kinematics.restarts import (
     FIRST_PATIENCE,
     FURTHER_PATIENCE,

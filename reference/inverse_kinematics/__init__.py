@@ -3,7 +3,7 @@
 The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
 kernel of a solver. From each start the kernel (`solve_chain.py`, `solve_mechanism.py`) runs the two
 loops of `restarts.py`. The loops call the solver's sweep or update (`fabrik.py`, `ccd.py`,
-`jacobian_methods.py`).
+`jacobian.py`).
 """
 
 from collections.abc import Sequence

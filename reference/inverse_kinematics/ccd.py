@@ -33,7 +33,7 @@ from ..quaternion import (
     subtract,
 )
 from .anderson import forget, mix
-from .box_step import descend
+from .bounded_step import descend
 from .chain import effector_error, rotate_links, update_positions
 from .fabrik import reach_forward
 from .mechanism import (

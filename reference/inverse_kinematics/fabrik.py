@@ -29,7 +29,7 @@ from ..quaternion import (
     store_vector,
     subtract,
 )
-from .box_step import descend
+from .bounded_step import descend
 from .chain import is_beyond_reach, root_distance, rounding
 from .mechanism import (
     move_by,

@@ -18,7 +18,7 @@ import math
 from ..articulation import FREEDOMS
 from ..jacobians import ZERO, motion, velocity_at
 from ..quaternion import add, cross, dot, load_vector, logarithm, norm, scale, subtract
-from .box_step import activate_limits, damped_step, stop_at_limits
+from .bounded_step import activate_limits, damped_step, stop_at_limits
 from .linear_algebra import clear, inner, solve
 from .mechanism import (
     effector_position,

@@ -14,7 +14,7 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import effector_of
 from ..skeleton import Skeleton
-from .jacobian_methods import PHASES
+from .jacobian import PHASES
 from .restarts import Limits
 from .solve_chain import ON_CHAINS
 from .solve_mechanism import ON_MECHANISMS

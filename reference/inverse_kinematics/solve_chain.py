@@ -25,7 +25,7 @@ from .chain import (
     store_local,
 )
 from .fabrik import fabrik_sweep
-from .jacobian_methods import (
+from .jacobian import (
     damped_least_squares_sweep,
     jacobian_transpose_sweep,
     levenberg_marquardt_sweep,

@@ -31,11 +31,11 @@ from ..quaternion import (
     subtract,
 )
 from .anderson import DEPTH, Mixing, forget, mixing_on, mixing_size
-from .box_step import TaskSystem, new_system
+from .bounded_step import TaskSystem, new_system
 from .ccd import anderson_ccd_update, ccd_update
 from .chain import BEND, POSITION_ROUNDING
 from .fabrik import BACKWARD, fabrik_update
-from .jacobian_methods import (
+from .jacobian import (
     damped_least_squares_update,
     jacobian_transpose_update,
     levenberg_marquardt_phase,

@@ -17,7 +17,7 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import Model, checked_model, effector_of
 from ..outcome import Outcome
-from .box_step import TaskSystem, damped_step, new_system, take_step
+from .bounded_step import TaskSystem, damped_step, new_system, take_step
 from .mechanism import (
     EFFECTOR,
     ConfigurationData,

@@ -16,7 +16,7 @@ from ... import arguments
 from ...arguments import FloatArray, is_plain, shown
 from ...articulation import LIMIT_TOLERANCE, Articulation
 from ...model import Model, checked_model, effector_of
-from ..box_step import FULL_CIRCLE
+from ..bounded_step import FULL_CIRCLE
 from ..problem import (
     CheckedTarget,
     Target,

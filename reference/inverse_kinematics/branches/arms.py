@@ -12,7 +12,7 @@ from ...arguments import FloatArray, IndexArray, frozen
 from ...articulation import HINGE, Articulation, joint_transform
 from ...jacobians import jacobian
 from ...skeleton import Skeleton
-from ..box_step import FULL_CIRCLE
+from ..bounded_step import FULL_CIRCLE
 from ..mechanism import Mechanism
 from ..reduce import prepare
 from .closed_forms import EXACT, FORMS, HINGES, NEAR, closed_form

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...articulation import HINGE, LIMIT_TOLERANCE
 from ...backend.compiled import Kernel
-from ..box_step import (
+from ..bounded_step import (
     FULL_CIRCLE,
     fill_errors,
     fill_jacobian,

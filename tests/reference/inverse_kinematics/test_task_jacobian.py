@@ -15,12 +15,12 @@ from plumbob.reference import (
     rotation,
     solve_ik,
 )
-from plumbob.reference.inverse_kinematics.box_step import (
+from plumbob.reference.inverse_kinematics.bounded_step import (
     damped_step,
     linearise_task,
     transposed_step,
 )
-from plumbob.reference.inverse_kinematics.jacobian_methods import (
+from plumbob.reference.inverse_kinematics.jacobian import (
     DAMPING_OF_POSES,
     DAMPING_OF_POSITIONS,
     FIXED_DAMPING,

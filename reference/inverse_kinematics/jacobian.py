@@ -8,7 +8,7 @@
 
 Let r_k be the arm from joint k of a chain to the effector. A rotation w_k of joint k moves the
 effector by w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. J J^T is 3 x 3 however many joints
-there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`box_step.py`) makes the
+there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`bounded_step.py`) makes the
 same iterations on a chain of ten balls, but a solve takes nine times as long.
 """
 
@@ -26,7 +26,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .box_step import (
+from .bounded_step import (
     lean,
     linearise_task,
     take_step,
