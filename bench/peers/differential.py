@@ -1,17 +1,17 @@
 """Differential inverse kinematics by quadratic programs, as in both mink and pink."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from functools import partial
 from math import hypot
 from typing import Any
 
 import numpy as np
 
-from plumbob.reference import rotation
-from plumbob.reference.inverse_kinematics.jacobian import LEANING, PHASES
+from plumbob.reference.inverse_kinematics.reduce import further_shares
 from plumbob.reference.inverse_kinematics.restarts import (
-    FIRST_PATIENCE,
-    FURTHER_PATIENCE,
+    MORE_PATIENT,
+    PATIENCE_OF_PHASES,
     PROGRESS,
 )
 
@@ -21,8 +21,6 @@ from .protocol import BenchRobot, FloatArray, Solve, Tolerance
 
 # Where a posture counts, iterations go on until a step is smaller than this [rad].
 SETTLED_STEP = 1e-3
-# The rotation that stands for the long way round: libraries take the shortest way [rad].
-LONG_WAY = np.pi - 1e-3
 
 
 def reaching(
@@ -63,62 +61,61 @@ def reaching(
     return reach
 
 
-class PhasedReach:
-    """A library's task loop in the phases of our Levenberg-Marquardt, see `solve_ik`.
+@dataclass
+class PhaseAttempt:
+    """An attempt from one of several starts."""
 
-    The first phase is the library's plain loop. Each further phase damps by a share of the squared
-    error, and turns the effector the long way round at first. A posture task for mid-range of the
-    same weight replaces the damping: a step damped about mid-range.
+    q: Any  # where it is, in the library's coordinates
+    patience: float = PATIENCE_OF_PHASES  # steps without progress after which it is given up
+    error: float = 0.0  # in units of the library's task, whose costs are 1; 0 before it begins
+
+
+class PhasedReach:
+    """A library's task loop in the phases of our Levenberg-Marquardt, see `restarts.py`.
+
+    A phase is the library's plain loop from the start, or from one of our further starts.
     """
 
     def __init__(
         self,
         solve_ik: Callable[..., Any],
         configuration: Any,
-        tasks: tuple[Any, Any],
-        rotated: Callable[[Any, FloatArray], Any],
-        goal: tuple[BenchRobot, Tolerance, int, int],
+        task: Any,
+        goal: tuple[BenchRobot, Tolerance, int],
+        further_starts: Iterable[FloatArray],
         **options: Any,
     ) -> None:
-        """Take tasks of the effector and of the posture, and a function to rotate a target.
-
-        The goal ends with the number of iterations and of phases.
-        """
-        robot, self.tolerance, self.iterations, self.phases = goal
+        """Take the task of the only effector; the goal ends with the number of iterations."""
+        robot, self.tolerance, self.iterations = goal
         robot.require_chain()
-        self.task, self.posture = tasks
-        self.configuration, self.rotated = configuration, rotated
+        self.task, self.configuration = task, configuration
+        self.further_starts = tuple(further_starts)
         self.solve = partial(library(solve_ik), configuration, solver="daqp", **options)
         self.integrate = library(configuration.integrate_inplace)
-        self.compute_error = library(self.task.compute_error)
-        self.damping = self.task.lm_damping
-        self.posture.set_target(middle(robot))
+        self.compute_error = library(task.compute_error)
 
     def __call__(self, targets: Sequence[Any], start: FloatArray) -> bool:
-        """Step from a start to the only target; return whether the effector arrives."""
-        (self.target,) = targets
-        ends: list[tuple[float, int, FloatArray]] = []
-        count = self.iterations
-        for phase in range(self.phases):
-            patience = FURTHER_PATIENCE if phase else FIRST_PATIENCE
-            self.configuration.update(start)
-            error, steps = self.attempt(phase, 0, count, patience)
-            if error == 0.0:
-                return True
-            ends.append((error, phase, self.configuration.q.copy()))
+        """Step from the starts to the only target; return whether the effector arrives."""
+        self.task.set_target(*targets)
+        attempts, count = [PhaseAttempt(q) for q in (start, *self.further_starts)], self.iterations
+        while True:
+            attempt = min(attempts, key=lambda a: (a.patience, a.error))
+            self.configuration.update(attempt.q)
+            attempt.error, steps = self.go_on(count, attempt.patience)
             count -= steps
-        _, phase, q = min(ends, key=lambda end: end[0])
-        self.configuration.update(q)
-        return self.attempt(phase, LEANING, count, np.inf)[0] == 0.0
+            if attempt.error == 0.0 or count <= 0:
+                return attempt.error == 0.0
+            attempt.q, attempt.patience = (
+                self.configuration.q.copy(), MORE_PATIENT * attempt.patience
+            )  # fmt: skip
 
-    def attempt(self, phase: int, begin: int, count: int, patience: float) -> tuple[float, int]:
+    def go_on(self, count: int, patience: float) -> tuple[float, int]:
         """Step until the target is reached or progress ends; return the error, 0 there, and steps.
 
-        The error is in units of the library's task, whose costs are 1.
+        There are `count` steps at most.
         """
         milestone, since = np.inf, 0
         for k in range(count + 1):
-            self.task.set_target(self.target)
             e = self.compute_error(self.configuration)
             error, limits = hypot(*e), self.tolerance
             if hypot(*e[:3]) <= limits.position and hypot(*e[3:]) <= limits.rotation:
@@ -128,31 +125,14 @@ class PhasedReach:
                 milestone, since = error, 0
             if k == count or since >= patience:
                 break
-            self.step(phase, begin + k, e)
+            self.integrate(self.solve([self.task], 1.0), 1.0)
         return error, k
 
-    def step(self, phase: int, iteration: int, e: FloatArray) -> None:
-        """Make a step of a phase from an error."""
-        tasks, self.task.lm_damping = [self.task], self.damping
-        if phase:
-            share, turns = PHASES[phase - 1]
-            if iteration < turns:
-                self.task.set_target(self.rotated(self.target, long_way(e[3:])))
-                e = self.compute_error(self.configuration)
-            self.task.lm_damping = 0.0 if iteration < LEANING else share
-            if iteration < LEANING:
-                self.posture.cost[...] = np.sqrt(share * e @ e)
-                tasks.append(self.posture)
-        self.integrate(self.solve(tasks, 1.0), 1.0)
 
-
-def long_way(error: FloatArray) -> FloatArray:
-    """Return the matrix that rotates a target so the way there is about the opposite axis.
-
-    The error is the rotation vector from the effector to the target [rad].
-    """
-    angle = max(hypot(*error), 1e-12)
-    return rotation.to_matrix(rotation.exponential(-error * (1.0 + LONG_WAY / angle)))
+def further_starts(robot: BenchRobot, phases: int) -> FloatArray:
+    """Return our further starts, (phase - 1, coordinate)."""
+    shares = further_shares(len(robot.lower))[: phases - 1]
+    return robot.lower + shares * (robot.upper - robot.lower)
 
 
 def meeting(

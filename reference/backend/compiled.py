@@ -33,8 +33,8 @@ PythonKernel = Any
 BACKENDS = ("numba", "python")
 # Optimisations allowed for relaxed kernels; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
-# Names in kernels that make arrays.
-ALLOCATING = {"np", "copy"}
+# Names in kernels that make arrays, or views that a kernel returns.
+ALLOCATING = {"np", "copy", "reshape", "view"}
 # The largest size of callees always inlined, in the interpreter's instructions.
 INLINED_SIZE = 5000
 # The interpreter's instructions that read a global.
@@ -65,17 +65,19 @@ class Kernel:
     `relaxed` lets the compiler reorder sums and fuse products with sums. The backends then agree
     only to rounding, and dense loops run up to four times faster. `label` is its name for users.
     Callees of more than `inlined_size` instructions of the interpreter are inlined only once.
+    `given` are the first arguments, such as other kernels; a call has the rest.
     """
 
     def __init__(
         self,
         plain: PythonKernel,
         *,
+        given: tuple[Any, ...] = (),
         relaxed: bool = False,
         label: str | None = None,
         inlined_size: int = INLINED_SIZE,
     ):
-        self.plain = plain
+        self.plain = plain = with_first(plain, given) if given else plain
         self.relaxed = relaxed
         self.label = label
         self.inlined_size = inlined_size
@@ -129,15 +131,20 @@ def compile_kernel(
     return compiled
 
 
-def bind(kernel: PythonKernel, **bound: Any) -> PythonKernel:
-    """Return a kernel with some of its globals replaced, for instance its callees.
+def with_first(kernel: PythonKernel, given: tuple[Any, ...]) -> PythonKernel:
+    """Return a kernel of the other arguments than the first, as `functools.partial` does.
 
-    Raise a ValueError if the kernel does not use a name, or has a closure.
+    The source is written out, since numba takes a call apart sooner if arguments have names.
     """
-    for name in bound:
-        if name not in kernel.__code__.co_names:
-            raise ValueError(f"bound: expected names that {kernel.__name__} has, got {name!r}")
-    return _rebuild(kernel, kernel.__globals__ | bound)
+    code = kernel.__code__
+    names = code.co_varnames[: code.co_argcount]
+    rest = ", ".join(names[len(given) :])
+    source = f"def {kernel.__name__}({rest}): return kernel({', '.join(names)})"
+    namespace = {"kernel": kernel, "__name__": kernel.__module__} | dict(
+        zip(names, given, strict=False)
+    )
+    exec(compile(source, code.co_filename, "exec"), namespace)
+    return namespace[kernel.__name__]
 
 
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
@@ -181,10 +188,10 @@ def _jit(kernel: PythonKernel, relaxed: bool, inlined_size: int, **options: Any)
         for name, value in _named_globals(kernel)
         if _kernels_in(value) and value is not kernel
     }
-    rebuilt = _rebuild(kernel, kernel.__globals__ | compiled_globals)
-    rebuilt.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
+    result = rebuilt(kernel, **compiled_globals)
+    result.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
     options |= {"error_model": "numpy", "nogil": True, "no_cfunc_wrapper": True}
-    return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(rebuilt)
+    return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(result)
 
 
 def _compiled_global(value: Any, relaxed: bool, inline: bool, inlined_size: int) -> Any:
@@ -222,14 +229,20 @@ def allocates(kernel: PythonKernel) -> bool:
     )
 
 
-def _rebuild(kernel: PythonKernel, new_globals: dict[str, Any]) -> PythonKernel:
+def rebuilt(kernel: PythonKernel, /, **other: Any) -> PythonKernel:
+    """Return a kernel with some other globals, such as compiled callees.
+
+    Raise a ValueError if the kernel has a closure.
+    """
     if kernel.__closure__:
         raise ValueError(f"kernel: {kernel.__qualname__} has a closure; pass what it needs instead")
-    rebuilt = types.FunctionType(kernel.__code__, new_globals, kernel.__name__, kernel.__defaults__)
-    rebuilt.__module__ = kernel.__module__
-    rebuilt.__qualname__ = kernel.__qualname__
-    rebuilt.__doc__ = kernel.__doc__
-    return rebuilt
+    result = types.FunctionType(
+        kernel.__code__, kernel.__globals__ | other, kernel.__name__, kernel.__defaults__
+    )
+    result.__module__ = kernel.__module__
+    result.__qualname__ = kernel.__qualname__
+    result.__doc__ = kernel.__doc__
+    return result
 
 
 def digest(kernel: PythonKernel) -> str:

@@ -1,9 +1,9 @@
 """Inverse kinematics: local rotations or coordinates that bring effectors to targets.
 
-The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands arrays to the
-kernel of a solver. From each start the kernel (`solve_chain.py`, `solve_mechanism.py`) runs the two
-loops of `restarts.py`. The loops call the solver's sweep or update (`fabrik.py`, `ccd.py`,
-`jacobian.py`).
+The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands them to the
+kernel of a solver, which stands at the end of its file (`fabrik.py`, `ccd.py`, `jacobian.py`,
+`levenberg_marquardt.py`). The kernel prepares a chain or a mechanism (`solve_chain.py`,
+`solve_mechanism.py`). From each start the loops of `restarts.py` call the solver's sweep or update.
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from .problem import (
     checked_targets,
     default_solver,
 )
-from .solve import solve_checked, solve_plain
+from .solve import solve_checked
 
 __all__ = [
     "IK_SOLVERS",
@@ -98,8 +98,6 @@ def solve_ik(
             1e-6 from unit length, a number is out of range, or a name is unknown. Also if an
             Articulation has several tips and no effector is named.
     """
-    if type(target) is list and len(target) == 1 and type(target[0]) is Target:
-        target = target[0]  # it takes the shorter route
     if solver is None:
         solver, default_restarts = default_solver(skeleton, target)
         restarts = default_restarts if restarts is None else restarts
@@ -107,13 +105,8 @@ def solve_ik(
         solver, tolerance, tolerance_rotation, max_iterations,
         0 if restarts is None else restarts, seed, record, phases,
     )  # fmt: skip
-    if prefer is not None:
-        model = checked_model(skeleton)
-        targets = checked_targets(model, target, effector)
-        return nearest_solution(model, local_rotations, targets, settings, prefer)
-    plain = solve_plain(skeleton, local_rotations, target, effector, settings)
-    if plain is not None:
-        return plain
     model = checked_model(skeleton)
     targets = checked_targets(model, target, effector)
+    if prefer is not None:
+        return nearest_solution(model, local_rotations, targets, settings, prefer)
     return solve_checked(model, local_rotations, targets, settings)

@@ -31,8 +31,6 @@ from .mechanism import (
 )
 
 FULL_CIRCLE = 2.0 * math.pi  # [rad]
-# A rotation by less [rad] has no axis to be made the long way round.
-LEAST_TURN = 1e-3
 # The step of a joint with followers is halved at most so often.
 HALVINGS = 20
 
@@ -123,39 +121,6 @@ def damped_step(mechanism, data, system, damping):
             any_active = True
         elif not (any_active and release(system)):
             return
-
-
-def turn_the_long_way(mechanism, target, system):
-    """Replace the rotation errors by the errors of the other way round, of 2 pi less the angle.
-
-    A rotation has two quaternions, Q and -Q; the solvers otherwise turn by the nearer.
-    """
-    for i in range(len(mechanism.effectors)):
-        if mechanism.effectors["oriented"][i]:
-            row, root = mechanism.effectors["row"][i] + 3, math.sqrt(target["weight"][i])
-            e = system.e[row : row + 3]
-            unit = root * LEVER * mechanism.reach
-            length = math.sqrt(inner(e, e))
-            if length > LEAST_TURN * unit:
-                for k in range(3):
-                    e[k] *= 1.0 - FULL_CIRCLE * unit / length
-
-
-def lean(mechanism, data, system):
-    """Put hinges and slides amid their limits, and leave in e what the step has to make up for.
-
-    Among poses equally near to the targets, the step then finds the nearest to mid-range, not to
-    the present pose. Joints without two limits, or with a full circle, stay.
-    """
-    joints = mechanism.joints
-    for j in range(len(joints)):
-        lower, upper = joints["lower"][j], joints["upper"][j]
-        if has_bounds(joints, j) and not covers_circle(joints, j) and math.isfinite(upper - lower):
-            at, k, middle = joints["coordinate"][j], joints["freedom"][j], 0.5 * (lower + upper)
-            shift = (middle - data.q[at]) / freedom_unit(mechanism, j)
-            data.q[at] = middle
-            for i in range(len(system.e)):
-                system.e[i] -= shift * system.J[k, i]
 
 
 def activate_limits(mechanism, data, system):

@@ -14,6 +14,7 @@ single sweep.
 import math
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
+from ..backend.compiled import Kernel
 from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
@@ -32,7 +33,7 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .anderson import forget, mix
+from .anderson import DEPTH, forget, mix
 from .bounded_step import descend
 from .chain import effector_error, rotate_links, update_positions
 from .fabrik import reach_forward
@@ -52,6 +53,8 @@ from .mechanism import (
     update_forward_kinematics,
 )
 from .restarts import copy_row
+from .solve_chain import on_chains, solve_chains
+from .solve_mechanism import on_mechanisms, solve_mechanisms
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
 
 
@@ -227,3 +230,17 @@ def translate_effectors(mechanism, data, j, v):
         if mechanism.moves[j, e]:
             moved = add(effector_position(mechanism, data, e), v)
             store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
+
+
+ON_CHAINS = Kernel(solve_chains, given=(on_chains(ccd_sweep), 0), label="ccd, chains")
+ON_MECHANISMS = Kernel(
+    solve_mechanisms, given=(on_mechanisms(ccd_update), 0), label="ccd, mechanisms"
+)
+ANDERSON_ON_CHAINS = Kernel(
+    solve_chains, given=(on_chains(anderson_ccd_sweep), DEPTH), label="anderson_ccd, chains"
+)
+ANDERSON_ON_MECHANISMS = Kernel(
+    solve_mechanisms,
+    given=(on_mechanisms(anderson_ccd_update), DEPTH),
+    label="anderson_ccd, mechanisms",
+)

@@ -7,9 +7,8 @@ body; all children of a branch share a rotation. A joint with followers goes dow
 remaining distances are the residual.
 """
 
-import numpy as np
-
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_in_world, joint_transform
+from ..backend.compiled import Kernel
 from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
@@ -38,13 +37,13 @@ from .mechanism import (
     translate_free,
     update_forward_kinematics,
 )
+from .solve_chain import on_chains, solve_chains
+from .solve_mechanism import on_mechanisms, solve_mechanisms
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
 # The weight of the identity in fitting a free joint, beside a single arm as long as the reach. The
 # fit is then unique up to rounding, and unchanged where the arms are right already.
 IDENTITY_WEIGHT = 1e-6
-# A joint's backward position [m], and its weight, 0 if the joint has no backward position.
-BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
 def fabrik_sweep(chain, target):
@@ -312,3 +311,9 @@ def pose_below(joints, data, j, k, x, R):
         k = joints["parent"][k]
     Q = load_quaternion(data.rotations, j)
     return rotate(Q, x), multiply(Q, R)
+
+
+ON_CHAINS = Kernel(solve_chains, given=(on_chains(fabrik_sweep), 0), label="fabrik, chains")
+ON_MECHANISMS = Kernel(
+    solve_mechanisms, given=(on_mechanisms(fabrik_update), 0), label="fabrik, mechanisms"
+)

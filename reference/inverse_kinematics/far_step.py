@@ -15,6 +15,8 @@ within reach would find 90 and 85 % for five times the iterations, and could jum
 
 import math
 
+import numpy as np
+
 from ..articulation import FREEDOMS
 from ..jacobians import ZERO, motion, velocity_at
 from ..quaternion import add, cross, dot, load_vector, logarithm, norm, scale, subtract
@@ -36,26 +38,31 @@ LARGEST_TRIES = 64
 # Limits of balls are met by projection only, so the error may rise again and again. Each rise
 # raises the decay to this power.
 FATIGUE = 0.9
+# What a step leaves to the next, for kernels; zero before the first.
+FAR_STEP = np.dtype(
+    [("factor", np.float64), ("square", np.float64), ("decay", np.float64)], align=True
+)
 # Below this angle [rad] a series is exact to rounding.
 SMALL_ANGLE = 1e-4
 
 
-def step_towards(mechanism, target, data, system, damping):
+def step_towards(state, target, damping):
     """Fill the damped step, towards a target proven out of reach Newton's."""
-    if least_residual(mechanism, target) > 0.0:
-        newton_step(mechanism, target, data, system)
+    if least_residual(state.mechanism, target) > 0.0:
+        newton_step(state, target)
     else:
-        damped_step(mechanism, data, system, damping)
+        damped_step(state.mechanism, state.data, state.workspace.system, damping)
 
 
-def newton_step(mechanism, target, data, system):
+def newton_step(state, target):
     """Fill the minimising step of the quadratic model of |e|²/2 within the limits.
 
-    The damping (Marquardt 1963) follows the error, by the factor, the squared error and the decay
-    of the last step in `data.far_step`. `system` has been linearised; its errors are used up.
+    The damping (Marquardt 1963) follows the error, by the factor, the squared error and the
+    decay of the last step. The errors linearised are used up.
     """
-    square, far_step = inner(system.e, system.e), data.far_step
-    factor, last_square, decay = far_step[0], far_step[1], far_step[2]
+    mechanism, data, system = state.mechanism, state.data, state.workspace.system
+    square, last = inner(system.e, system.e), state.far_step[0]
+    factor, last_square, decay = last["factor"], last["square"], last["decay"]
     if last_square == 0.0:
         factor, decay = FIRST_DAMPING, DECAY
     elif square > last_square:
@@ -73,7 +80,7 @@ def newton_step(mechanism, target, data, system):
         if not is_positive:
             factor *= STIFFENING
             clear(system.step)
-    far_step[0], far_step[1], far_step[2] = factor, square, decay
+    last["factor"], last["square"], last["decay"] = factor, square, decay
 
 
 def fill_hessian(mechanism, target, data, system):

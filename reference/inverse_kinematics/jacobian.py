@@ -1,17 +1,18 @@
-"""The methods that step along a Jacobian, each as a sweep of a chain and an update of a mechanism.
+"""The transposed Jacobian and damped least squares: a sweep of a chain, an update of a mechanism.
 
 - The transposed Jacobian (Wolovich & Elliott 1984; Balestrino et al. 1984; its step: Buss 2004).
 - Damped least squares with a fixed damping (Wampler 1986; Nakamura & Hanafusa 1986).
-- Levenberg-Marquardt, whose damping mu = 1/2 |e|^2 plus a bias follows the squared error (Sugihara
-  2011). Far from the target, or where the target is beyond reach, the step is short and safe; near
-  the target convergence is quadratic even where the Jacobian loses rank.
 
 Let r_k be the arm from joint k of a chain to the effector. A rotation w_k of joint k moves the
 effector by w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. J J^T is 3 x 3 however many joints
-there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`bounded_step.py`) makes the
-same iterations on a chain of ten balls, but a solve takes nine times as long.
+there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`bounded_step.py`) makes
+the same iterations on a chain of ten balls, but a solve takes nine times as long.
+
+`restarts.py` iterates. A step on a mechanism keeps the limits (`bounded_step.py`). Towards a target
+out of reach damped least squares makes Newton's steps (`far_step.py`).
 """
 
+from ..backend.compiled import Kernel
 from ..quaternion import (
     IDENTITY,
     cross,
@@ -26,16 +27,11 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .bounded_step import (
-    lean,
-    linearise_task,
-    take_step,
-    transposed_step,
-    turn_the_long_way,
-)
+from .bounded_step import linearise_task, take_step, transposed_step
 from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
 from .far_step import step_towards
-from .linear_algebra import ROUNDING_DAMPING, inner
+from .solve_chain import on_chains, solve_chains
+from .solve_mechanism import on_mechanisms, solve_mechanisms
 
 # How far beyond reach a chain's target may be, over the reach; a further target is drawn nearer.
 # Steps towards a far target would swing about the nearest point; the nearer to reach itself, the
@@ -43,16 +39,6 @@ from .linear_algebra import ROUNDING_DAMPING, inner
 BEYOND_TRANSPOSED, BEYOND_DAMPED = 0.2, 0.02
 # The square of the fixed damping factor, over the reach squared: a tenth of the reach.
 FIXED_DAMPING = 0.01
-# Damping over the squared error, for positions; and for rotations as well, the factor of Chan &
-# Lawrence 1988, which needs fewer iterations there.
-DAMPING_OF_POSITIONS, DAMPING_OF_POSES = 0.5, 0.1
-# The phases after the first: the damping, over the squared error, and how many iterations turn the
-# long way round. Chosen on the bench's tuning robots alone, from 1e-4 to 2 and from 0 to 15.
-PHASES = ((0.1, 3), (0.1, 4), (0.01, 2), (0.01, 3), (0.01, 4), (0.001, 2), (0.001, 0))
-# The first iterations of each of these phases, which lean to mid-range.
-LEANING = 8
-# Over the reach squared; only to keep a division by zero away.
-BIAS = 1e-24
 
 
 def jacobian_transpose_sweep(chain, target):
@@ -88,50 +74,8 @@ def damped_least_squares_update(state, target):
     mechanism, data, system = state.mechanism, state.data, state.workspace.system
     linearise_task(mechanism, target, data, system)
     damping = FIXED_DAMPING * mechanism.reach * mechanism.reach
-    step_towards(mechanism, target, data, system, damping)
+    step_towards(state, target, damping)
     take_step(mechanism, data, system)
-
-
-def levenberg_marquardt_sweep(chain, target):
-    """Rotate all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
-    e, A = linearise(chain, target, 0.0)
-    damping = DAMPING_OF_POSITIONS * dot(e, e) + BIAS * chain.reach * chain.reach
-    damping += ROUNDING_DAMPING * (A[0] + A[1] + A[2])
-    rotate_joints(chain, solve_damped(A, damping, e))
-
-
-def levenberg_marquardt_update(state, target):
-    """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits.
-
-    The further PHASES solve again from a start that stalls, mostly at a limit. At first they rotate
-    the longer way round, and the null space leans to mid-range (Liegeois 1977).
-    """
-    mechanism, data, system = state.mechanism, state.data, state.workspace.system
-    linearise_task(mechanism, target, data, system)
-    positions = 3 * len(mechanism.effectors) == mechanism.equations
-    share = DAMPING_OF_POSITIONS if positions else DAMPING_OF_POSES
-    phase, iteration = int(data.phase[0]), data.phase[1]
-    if phase > 0:
-        share, turns = PHASES[phase - 1]
-        if iteration < turns:
-            turn_the_long_way(mechanism, target, system)
-    damping = share * inner(system.e, system.e) + BIAS * mechanism.reach * mechanism.reach
-    if phase > 0 and iteration < LEANING:
-        lean(mechanism, data, system)
-    data.phase[1] += 1.0
-    step_towards(mechanism, target, data, system, damping)
-    take_step(mechanism, data, system)
-
-
-def levenberg_marquardt_phase(state, n):
-    """Begin phase n of Levenberg-Marquardt; return whether the phase exists."""
-    state.data.phase[0], state.data.phase[1] = n, 0.0
-    return n <= len(PHASES)
-
-
-def only_phase(_state, n):
-    """Return whether phase n is the first, the only phase of other solvers."""
-    return n == 0
 
 
 def linearise(chain, target, beyond):
@@ -201,3 +145,23 @@ def rotate_joints(chain, z):
         R = load_quaternion(chain.rotations, k)
         store_quaternion(chain.rotations, k, renormalised(multiply(above, R)))
     update_positions(chain)
+
+
+TRANSPOSE_ON_CHAINS = Kernel(
+    solve_chains, given=(on_chains(jacobian_transpose_sweep), 0), label="jacobian_transpose, chains"
+)
+TRANSPOSE_ON_MECHANISMS = Kernel(
+    solve_mechanisms,
+    given=(on_mechanisms(jacobian_transpose_update), 0),
+    label="jacobian_transpose, mechanisms",
+)
+DAMPED_ON_CHAINS = Kernel(
+    solve_chains,
+    given=(on_chains(damped_least_squares_sweep), 0),
+    label="damped_least_squares, chains",
+)
+DAMPED_ON_MECHANISMS = Kernel(
+    solve_mechanisms,
+    given=(on_mechanisms(damped_least_squares_update), 0),
+    label="damped_least_squares, mechanisms",
+)

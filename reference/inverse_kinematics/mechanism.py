@@ -11,7 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..arguments import BoolArray, FloatArray, IndexArray, RecordArray
-from ..articulation import FREE, articulated_pose, ball_coordinate, clamp_ball
+from ..articulation import FREE, JOINT, articulated_pose, ball_coordinate, clamp_ball
+from ..backend.memory import packed, part
 from ..quaternion import (
     add,
     conjugate,
@@ -52,6 +53,9 @@ EFFECTOR = np.dtype(
 TARGET = np.dtype(
     [("position", np.float64, 3), ("rotation", np.float64, 4), ("weight", np.float64)], align=True
 )
+TARGET_WIDTH = TARGET.itemsize // 8  # the numbers of a record
+# A joint's backward position in FABRIK [m], and its weight, 0 if the joint has none.
+BACKWARD = np.dtype([("position", np.float64, 3), ("weight", np.float64)], align=True)
 
 
 class Mechanism(NamedTuple):
@@ -75,27 +79,61 @@ class Mechanism(NamedTuple):
 class ConfigurationData(NamedTuple):
     """A mechanism's coordinates with their forward kinematics; effectors come behind the joints."""
 
-    # where an attempt continues: `q`, `far_step` and `phase`, (coordinate + 5,)
-    state: FloatArray
     q: FloatArray  # (coordinate,)
-    far_step: FloatArray  # see `far_step`, (3,); zero before the first step
-    phase: FloatArray  # the number of the solver's phase, and the iterations made in it, (2,)
     positions: FloatArray  # in the world [m], (joint + effector, 3)
     rotations: FloatArray  # in the world, (joint + effector, 4)
 
 
+class Problem(NamedTuple):
+    """What the kernels read of a solve."""
+
+    joints: RecordArray  # of the articulation, JOINT, (joint,)
+    width: int  # the number of its coordinates
+    mechanism: Mechanism
+    restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
+    # the effectors in these poses, positions [m] and rotations, (restart, effector, 7)
+    effector_frames: FloatArray
+    shares: FloatArray  # of the ranges of joints at further starts, (phase - 1, joint)
+
+
+def packed_problem(problem: Problem) -> FloatArray:
+    """Return a problem in a single block of memory, to be viewed by `problem_on`."""
+    mechanism = problem.mechanism
+    sizes = np.array([problem.width, mechanism.freedoms, mechanism.equations])
+    return packed(
+        sizes, np.array([mechanism.reach]), problem.joints, mechanism.joints, mechanism.columns,
+        mechanism.effectors, mechanism.moves, mechanism.adjacent, problem.restarts,
+        problem.effector_frames, problem.shares,
+    )  # fmt: skip
+
+
+def problem_on(memory):
+    """Return the problem in a block of memory."""
+    sizes, reach = part(memory, 0, np.int64), part(memory, 1, np.float64)[0]
+    joints, columns = part(memory, 3, JOINT), part(memory, 4, np.int64)
+    effectors, n = part(memory, 5, EFFECTOR), len(joints)
+    ends = len(effectors)
+    moves, adjacent = part(memory, 6, np.bool_), part(memory, 7, np.bool_)
+    restarts, frames = part(memory, 8, np.float64), part(memory, 9, np.float64)
+    shares = part(memory, 10, np.float64)
+    count = len(frames) // (7 * ends)
+    return Problem(
+        part(memory, 2, JOINT), sizes[0],
+        Mechanism(
+            joints, columns, effectors, moves[: n * ends].reshape(n, ends),
+            adjacent[: n * (n + ends)].reshape(n, n + ends), reach, sizes[1], sizes[2],
+        ),
+        restarts.reshape(count, len(columns)), frames.reshape(count, ends, 7),
+        shares.reshape(len(shares) // max(n, 1), n),
+    )  # fmt: skip
+
+
 def new_data(mechanism):
     """Return the data of a configuration, to be filled."""
-    return data_on(mechanism, np.zeros(len(mechanism.columns) + 5))
-
-
-def data_on(mechanism, state):
-    """Return the data of a configuration, to be filled, whose state is a row (coordinate + 5,)."""
-    count, n = len(mechanism.joints) + len(mechanism.effectors), len(mechanism.columns)
+    count = len(mechanism.joints) + len(mechanism.effectors)
     return ConfigurationData(
-        state, state[:n], state[n : n + 3], state[n + 3 :],
-        np.empty((count, 3)), np.empty((count, 4)),
-    )  # fmt: skip
+        np.empty(len(mechanism.columns)), np.empty((count, 3)), np.empty((count, 4))
+    )
 
 
 def gather(mechanism, q, own):

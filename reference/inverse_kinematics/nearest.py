@@ -42,7 +42,7 @@ def nearest_solution(
         raise ValueError("prefer: expected an Articulation or a Robot, got a Skeleton")
     check_single(targets)
     q = model.checked("q", arguments.floats("q", start, model.coordinate_count))
-    limits = settings.limits._replace(restarts=0)
+    limits = settings.limits._replace(restarts=0, phases=1)
     single_start = replace(settings, limits=limits)
     rng = np.random.default_rng(settings.seed)
     effectors, oriented = zip(*((t.joint, t.rotation is not None) for t in targets), strict=True)

@@ -7,17 +7,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FLOAT64, boolean, floats, frozen, is_plain
+from ..arguments import boolean, floats, frozen, is_plain
 from ..articulation import Articulation
 from ..model import Model, checked_model, coordinates_name, effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
-from .mechanism import TARGET
-from .problem import Settings, Target, checked_settings, checked_targets, default_solver
-from .reduce import prepare
-from .restarts import FIGURES, OUTCOME
-from .solve import OUTCOMES, PROVEN, UNRECORDED, prove_unreachable, solve_checked
+from .problem import (
+    CheckedTarget,
+    Settings,
+    Target,
+    checked_settings,
+    checked_targets,
+    default_solver,
+)
+from .reduce import prepare, prepare_chain
+from .result import OUTCOME, result_on, result_size
+from .solve import OUTCOMES, PROVEN, prove_unreachable, solve_checked, target_rows
 
 
 class PreparedIK(threading.local):
@@ -38,34 +44,44 @@ class PreparedIK(threading.local):
         self, model: Skeleton | Articulation, joint: int, oriented: bool, settings: Settings
     ):
         """Allocate the arrays of a thread; `prepare_ik` checks the arguments."""
-        n, local = model.joint_count, np.full((1, model.joint_count, 4), np.nan)
-        positions, figures = np.full((1, n, 3), np.nan), np.full((1, len(FIGURES)), np.nan)
-        arrays: tuple[Any, ...]
-        shape: tuple[int, ...]
         prove: Any = None
+        shape: tuple[int, ...]
         if isinstance(model, Skeleton):
-            shape, q, kernel = (n, 4), local, settings.solver.chain
-            arrays = (*model.arrays, model.path_array(joint))
-            targets: Any = np.empty((1, 3))
-            row = targets[0]
-            results: tuple[Any, ...] = local, positions, figures, UNRECORDED
+            problem, kernel = prepare_chain(model, joint), settings.solver.chain
+            target, shape, length = np.empty(3), (model.joint_count, 4), 3
         else:
-            shape, kernel = (model.coordinate_count,), settings.solver.mechanism
-            drawn = settings.limits.restarts, settings.seed
-            arrays = (prepare(model, (joint,), (oriented,), *drawn).model,)
-            targets, q = np.zeros((1, 1), TARGET), np.full((1, model.coordinate_count), np.nan)
-            targets["rotation"], targets["weight"] = IDENTITY, 1.0
-            row = targets.view(FLOAT64)[0, : 7 if oriented else 3]
-            results = local, positions, figures, UNRECORDED, q
-            request = model, (joint,), (oriented,), targets, figures, settings.limits
+            restarts, seed = settings.limits.restarts, settings.seed
+            problem, kernel = (
+                prepare(model, (joint,), (oriented,), restarts, seed),
+                settings.solver.mechanism,
+            )
+            target, shape = (
+                target_rows([CheckedTarget(joint, np.zeros(3), None, 1.0)], ()),
+                (model.coordinate_count,),
+            )
+            length = 7 if oriented else 3
+        start, memory = np.empty(shape), np.full(result_size(*problem[1:3], 1), np.nan)
+        result = result_on(memory, 1, *problem[1:3])
+        local, positions, figures, q, _ = [values[0] for values in result]
+        q = local if isinstance(model, Skeleton) else q
+        if isinstance(model, Articulation):
+            request = model, problem, target, memory, settings.limits
             prove = partial(prove_unreachable, *request)
-        starts, self._arrays = np.empty((1, *shape)), (q, positions, figures)
-        self._problem = model, joint, oriented, settings
-        call = partial(kernel.in_force, *arrays, settings.numbers, starts, targets, *results)
-        self.coordinates, self.positions = frozen(q[0]), frozen(positions[0])
-        self.figures = frozen(figures[0])
+        self._problem, self._arrays = (model, joint, oriented, settings), (q, positions, figures)
+        call = partial(
+            kernel.in_force,
+            problem.memory,
+            settings.numbers,
+            start.reshape(-1),
+            target,
+            memory,
+            0,
+            1,
+        )
+        self.coordinates, self.positions = frozen(q), frozen(positions)
+        self.figures = frozen(figures)
         # one attribute, as a thread's attribute takes 0.05 µs
-        self._work = call, shape, starts[0], row.shape, row, self.figures, prove
+        self._work = call, shape, start, (length,), target[:length], self.figures, prove
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return what makes a copy, which has arrays of its own."""
@@ -108,7 +124,7 @@ class PreparedIK(threading.local):
         )  # fmt: skip
         results = solution.coordinates, solution.positions, figures
         for array, row in zip(self._arrays, results, strict=True):
-            array[0] = row
+            array[...] = row
 
 
 def prepare_ik(

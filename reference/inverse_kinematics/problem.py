@@ -14,17 +14,16 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import effector_of
 from ..skeleton import Skeleton
-from .jacobian import PHASES
+from . import ccd, fabrik, jacobian, levenberg_marquardt
+from .reduce import FURTHER_STARTS
 from .restarts import Limits
-from .solve_chain import ON_CHAINS
-from .solve_mechanism import ON_MECHANISMS
 
 # The defaults of `solve_ik`: iterations of an attempt, and of an attempt towards a target out of
 # reach. Then restarts of the default Levenberg-Marquardt, for one effector and for several; with
 # several a restart redraws the failing limbs.
 MAX_ITERATIONS, FAR_ITERATIONS, RESTARTS, LIMB_RESTARTS = 100, 2000, 20, 100
 # The phases of each solver, the first of which is the plain method; of others 1.
-PHASE_COUNTS = {"levenberg_marquardt": 1 + len(PHASES)}
+PHASE_COUNTS = {"levenberg_marquardt": 1 + FURTHER_STARTS}
 # All integers up to this are floats.
 LARGEST_COUNT = 2**53
 
@@ -135,7 +134,9 @@ def checked_targets(
 
 def are_targets(target: Any) -> TypeGuard[Sequence[Target]]:
     """Return whether an argument is a sequence with a Target."""
-    return isinstance(target, list | tuple) and any(isinstance(x, Target) for x in target)
+    if isinstance(target, Target) or not isinstance(target, list | tuple):
+        return False
+    return any(isinstance(x, Target) for x in target)
 
 
 def _checked(
@@ -195,7 +196,15 @@ def _solver(name: str) -> IKSolver:
     return IK_SOLVERS[name]
 
 
-IK_SOLVERS = {name: IKSolver(name, ON_CHAINS[name], ON_MECHANISMS[name]) for name in ON_CHAINS}
+_KERNELS = {
+    "ccd": (ccd.ON_CHAINS, ccd.ON_MECHANISMS),
+    "fabrik": (fabrik.ON_CHAINS, fabrik.ON_MECHANISMS),
+    "levenberg_marquardt": (levenberg_marquardt.ON_CHAINS, levenberg_marquardt.ON_MECHANISMS),
+    "damped_least_squares": (jacobian.DAMPED_ON_CHAINS, jacobian.DAMPED_ON_MECHANISMS),
+    "jacobian_transpose": (jacobian.TRANSPOSE_ON_CHAINS, jacobian.TRANSPOSE_ON_MECHANISMS),
+    "anderson_ccd": (ccd.ANDERSON_ON_CHAINS, ccd.ANDERSON_ON_MECHANISMS),
+}
+IK_SOLVERS = {name: IKSolver(name, *kernels) for name, kernels in _KERNELS.items()}
 
 
 @dataclass(frozen=True)

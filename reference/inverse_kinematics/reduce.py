@@ -16,24 +16,54 @@ from ..articulation import (
     rotated_by_pi,
 )
 from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
-from .mechanism import EFFECTOR, Mechanism
+from ..skeleton import Skeleton
+from .mechanism import EFFECTOR, Mechanism, Problem, packed_problem
+from .solve_chain import packed_chain
 
 # Points coincide if their distance is at most this, over the reach.
 SPOT = 1e-9
 # Random poses are drawn so many at a time.
 BLOCK = 16
+# Further starts of Levenberg-Marquardt, and the part of the joints' ranges that they take: near a
+# limit a start soon ends at the limit. Chosen on the bench's tuning robots alone.
+FURTHER_STARTS, SPREAD = 7, 0.5
 # An articulation keeps this many prepared mechanisms, the latest: each seed makes a new one.
 LARGEST_CACHE = 256
 
 
-class Prepared(NamedTuple):
-    """A mechanism and random restarts, made once for some effectors."""
+class IKProblem(NamedTuple):
+    """A model and its effectors, as the kernels of the solvers read the two.
 
-    mechanism: Mechanism  # the joints that move the effectors
-    restarts: FloatArray  # the mechanism's coordinates in random poses, (restart, coordinate)
-    # the effectors in these poses, positions [m] and rotations, (restart, effector, 7)
-    effector_frames: FloatArray
-    model: tuple[Any, ...]  # joints of the articulation, fields of the mechanism, the two above
+    Attributes:
+        memory: what a kernel reads, in a single block.
+        joints: the number of the model's joints.
+        coordinates: the number of an Articulation's coordinates; 0 of a chain of unlimited balls,
+            whose only effector has a position to reach.
+        effectors: joints.
+        oriented: whether targets of the effectors have rotations.
+        mechanism: of an Articulation.
+        restarts: of an Articulation, the mechanism's coordinates in random poses, (restart,
+            coordinate).
+    """
+
+    memory: FloatArray
+    joints: int
+    coordinates: int
+    effectors: tuple[int, ...]
+    oriented: tuple[bool, ...]
+    mechanism: Any = None  # Mechanism | None, which type checkers cannot tell apart
+    restarts: Any = None
+
+
+def prepare_chain(skeleton: Skeleton, effector: int) -> IKProblem:
+    """Return the chain up to an effector, cached by the skeleton."""
+    chains = skeleton.__dict__.setdefault("chains", {})
+    problem = chains.get(effector)
+    if problem is None:
+        memory = packed_chain(skeleton, effector)
+        problem = IKProblem(memory, skeleton.joint_count, 0, (effector,), (False,))
+        chains[effector] = problem
+    return problem
 
 
 def prepare(
@@ -42,33 +72,49 @@ def prepare(
     oriented: tuple[bool, ...],
     restarts: int = 0,
     seed: int = 0,
-) -> Prepared:
-    """Return the mechanism and its restarts, cached by the articulation."""
+) -> IKProblem:
+    """Return the mechanism that moves the effectors and its restarts, cached by the articulation.
+
+    An articulation keeps LARGEST_CACHE problems, the latest.
+    """
     key = effectors, oriented, restarts, seed
-    prepared = articulation.mechanisms.get(key)
-    if prepared is None:
+    problems = articulation.mechanisms
+    problem = problems.get(key)
+    if problem is None:
         mechanism, rng = _mechanism(articulation, effectors, oriented), np.random.default_rng(seed)
         # in blocks: the first poses are the same for any larger number of restarts
         blocks = [articulation.random(rng, BLOCK) for _ in range(-(-restarts // BLOCK))]
         poses = np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:restarts]
-        effector_frames = np.empty((0, len(effectors), 7))
+        frames = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
-            effector_frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
-        drawn = np.ascontiguousarray(poses[:, mechanism.columns]), effector_frames.copy()
-        model = articulation.joints, tuple(mechanism), *drawn
-        prepared = Prepared(mechanism, *drawn, model)
-        store_prepared(articulation, key, prepared)
-    return prepared
+            frames = np.concatenate([x, R], axis=-1)[:, list(effectors)]
+        width, drawn = articulation.coordinate_count, poses[:, mechanism.columns]
+        shares = further_shares(len(mechanism.joints))
+        memory = packed_problem(
+            Problem(articulation.joints, width, mechanism, drawn, frames, shares)
+        )
+        count = articulation.joint_count
+        problem = IKProblem(memory, count, width, effectors, oriented, mechanism, drawn)
+        keys = [old for old, entry in list(problems.items()) if isinstance(entry, IKProblem)]
+        for old in keys[: max(0, len(keys) + 1 - LARGEST_CACHE)]:
+            problems.pop(old, None)
+        problems[key] = problem
+    return problem
 
 
-def store_prepared(articulation: Articulation, key: tuple[Any, ...], prepared: Prepared) -> None:
-    """Keep a prepared mechanism in place of the oldest, if there are already LARGEST_CACHE."""
-    entries = list(articulation.mechanisms.items())
-    keys = [old for old, entry in entries if isinstance(entry, Prepared)]
-    for old in keys[: max(0, len(keys) + 1 - LARGEST_CACHE)]:
-        articulation.mechanisms.pop(old, None)
-    articulation.mechanisms[key] = prepared
+def further_shares(joints: int) -> FloatArray:
+    """Return the shares of the joints' ranges at further starts, (FURTHER_STARTS, joint).
+
+    They fill the middle of a cube evenly: Roberts' additive recurrence (2018), whose step along
+    axis i is phi^-i, where phi^(joint + 1) = phi + 1. The first is the centre.
+    """
+    phi = 2.0
+    for _ in range(60):  # each halves the error at least
+        phi = (1.0 + phi) ** (1.0 / (joints + 1))
+    steps = phi ** -np.arange(1.0, joints + 1)
+    places = (0.5 + np.arange(FURTHER_STARTS)[:, None] * steps) % 1.0
+    return 0.5 + SPREAD * (places - 0.5)
 
 
 def _mechanism(

@@ -1,40 +1,46 @@
-"""The loops of every solver: iterations of an attempt, attempts from further starts, and phases.
+"""The loops of every solver: iterations of an attempt, and attempts from several starts.
 
 The loops work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
-(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of numbers that an
-attempt continues from.
+(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of coordinates, from
+which an attempt continues.
+
+Attempts are the plain attempt from the start, then random *restarts*. A solver with *phases* makes
+another round: from the start, and from further starts that are always the same.
 """
 
 import math
 from typing import NamedTuple
 
-from ..arguments import FloatArray
-from ..backend.compiled import PythonKernel
-from ..outcome import Outcome
+import numpy as np
 
-# If further attempts may follow, give up an attempt when PATIENCE iterations have not brought its
-# error down to the share PROGRESS. If no attempt reaches the target, attempts go on, MORE_PATIENT
-# times as patient each time.
-PATIENCE, PROGRESS, MORE_PATIENT = 3, 0.5, 4
-# The patience of the phases of a single start: of the first phase, and of each further phase. The
-# first costs 1 or 2 in 1,000 of the targets that the phase would ever reach.
-FIRST_PATIENCE, FURTHER_PATIENCE = 50.0, 10.0
+from ..arguments import FloatArray, RecordArray
+from ..backend.compiled import PythonKernel
+
+# If further attempts may follow, an attempt is given up when so many iterations have not brought
+# its error down to the share PROGRESS. If none reaches the target, attempts go on, MORE_PATIENT
+# times as patient each time. Restarts are many, and phases few. On the bench's tuning robots these
+# numbers took the fewest iterations of those that reached most targets.
+PATIENCE, PATIENCE_OF_PHASES = 3, 8
+PROGRESS, MORE_PATIENT = 0.5, 4
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; without
 # further progress; with its iterations used; given up early.
 REACHED, STALLED, LIMITED, GIVEN_UP = range(4)
-# Columns of progress: iterations made, end of the attempt, its merit [m] and its patience. Then an
-# error [m] whose share PROGRESS is the next progress, at first infinite; the iterations since the
-# last progress; and the largest number of iterations.
-COUNT, STATE, COST, WAIT, MILESTONE, SINCE, LIMIT = range(7)
-# Rows behind the rows of attempts, of progress and of saved states: the best end of a phase, the
-# start, and the best attempt. In the last row iterations are the sum over all attempts.
-BEST_PHASE, START, BEST = -3, -2, -1
-SPARE_ROWS = 3  # their number
 INFINITY = math.inf
-# Columns of Result.figures: the largest distance [m] and angle [rad] from effector to target, the
-# number of iterations, and the value of the outcome. Then the merit [m], and the distance above the
-# least that geometry allows [m].
-RESIDUAL, RESIDUAL_ROTATION, ITERATIONS, OUTCOME, MERIT, EXCESS = FIGURES = range(6)
+# An attempt at a target, for kernels.
+ATTEMPT = np.dtype(
+    [
+        ("iterations", np.int64),  # made so far
+        ("ending", np.int64),
+        ("merit", np.float64),  # of its end [m], infinite before the attempt begins
+        ("patience", np.float64),  # iterations without progress after which it is given up
+        ("milestone", np.float64),  # the error [m] whose share PROGRESS is the next progress
+        ("since", np.int64),  # iterations since the last progress
+    ],
+    align=True,
+)
+# The start and the best attempt stand behind all attempts. Iterations of the best are those of all.
+START, BEST = -2, -1
+SPARE = 2  # their number
 
 
 class Operations(NamedTuple):
@@ -45,14 +51,13 @@ class Operations(NamedTuple):
     # sum of all distances and levered angles [m] to show progress, and the distance to make small
     error: PythonKernel
     merit: PythonKernel  # (state, target): return the cost by which attempts are compared [m]
-    # (state, target, criteria, first): move a stuck first attempt, whose row of progress is
-    # `first`; return whether it was stuck
+    # (state, target, criteria, first): move a stuck first attempt, whose record is `first`; return
+    # whether it was stuck
     perturb: PythonKernel
     place: PythonKernel  # (state): bring the state to what has been copied to its row
     # (state, target, criteria, n): take from the configuration of random restart n = 1, 2 ...
     draw: PythonKernel
-    # (state, n): begin phase n = 0, 1 ... of the solver; return whether the phase exists
-    begin: PythonKernel
+    shift: PythonKernel  # (state, n): move the state from the start to the start of phase n = 1 ...
 
 
 class Limits(NamedTuple):
@@ -64,31 +69,29 @@ class Limits(NamedTuple):
     far_iterations: int  # the same where geometry proves a target out of reach
     restarts: int  # further attempts
     chained: bool  # whether each target but the first starts from the solution before it
-    phases: int  # that a start goes through while it stalls, at most; 1 is the plain method
+    phases: int  # starts, always the same, that a solver may try; 1 is the plain method
 
 
 class Criteria(NamedTuple):
-    """The end criteria of attempts at a target."""
+    """The end criteria of attempts at a target, and the number of attempts."""
 
     # distance from the target that counts as reached [m], less the rounding of the final pose
     distance: float
     angle: float  # the same for rotations [rad]
     margin: float  # an error that changes by no more has stalled [m]
-    max_iterations: int  # of each attempt
+    max_iterations: int  # of an attempt from a random configuration, and of all from the start
+    restarts: int  # attempts from random configurations
+    phases: int  # attempts from the start and from further starts, 1 of a plain method
+    extensions: int  # times that the plain attempt has as many iterations again, without phases
+    gives_up: bool  # whether attempts are given up early
     redraws_limbs: bool  # whether a restart leaves the limbs whose effectors reach their targets
 
 
-class Result(NamedTuple):
-    """The arrays that kernels fill, a row a target."""
+class Attempts(NamedTuple):
+    """The attempts: from the start, from random configurations, in phases; then the spare two."""
 
-    local: FloatArray  # local rotations, (target, joint, 4)
-    positions: FloatArray  # global positions [m], (target, joint, 3)
-    figures: FloatArray  # (target, 6), see above
-    # distances before and after each iteration [m], (target, iteration); (1, 1) if not recorded.
-    # Entries after the last iteration are not filled
-    history: FloatArray
-    # of an articulation, (target, coordinate); of a skeleton its local rotations
-    coordinates: FloatArray
+    attempts: RecordArray  # ATTEMPT, (attempt + 2,)
+    rows: FloatArray  # the coordinates where each ended, (attempt + 2, coordinate)
 
 
 def limits_of(numbers):
@@ -99,203 +102,195 @@ def limits_of(numbers):
     )  # fmt: skip
 
 
-def solve_with_restarts(operations, state, saved, progress, target, limits, criteria, history):
-    """Attempt from the start, then from random configurations, until the target is reached.
+def new_search(attempts, width):
+    """Return room for attempts on rows of a width, not filled."""
+    count = attempts + SPARE
+    return Attempts(np.empty(count, ATTEMPT), np.empty((count, width)))
 
-    While others may follow, an attempt at a target in reach is given up early. If no attempt
-    reaches the target, all are finished, unless each has redrawn the failing limbs of its
-    predecessor. Finally a solver of several phases goes through all phases as from a single start.
-    With any other solver the first attempt makes as many iterations as all attempts may. Its ends
-    after each attempt's number of iterations count as attempts too. So the result is no worse than
-    from a single start, or with fewer restarts.
 
-    The rows of `saved`, states, and of `progress`, see the columns above, are of attempts and then
-    the spare rows. The best attempt is saved in the last row.
+def solve_with_restarts(operations, state, search, target, criteria, history):
+    """Make attempts from the start and from other configurations until one reaches the target.
+
+    An attempt at a target in reach is given up early if others may follow. While none reaches the
+    target, the most promising attempt given up goes on. The phases have the iterations of an
+    attempt together, and are the same whatever the number of restarts. With a solver of a single
+    phase the start goes on for as many iterations as all attempts may make. So the result is no
+    worse than with fewer restarts.
 
     Returns:
         The iterations of all attempts, and whether the best of them stalled.
     """
-    total, in_reach = progress[BEST], criteria.distance <= limits.tolerance
-    phased = limits.phases > 1 and in_reach and operations.begin(state, 1)
-    operations.begin(state, 0)
-    begin_rows(progress, criteria, in_reach, phased)
+    begin_search(operations, state, search, target, criteria)
     distance, _, _, _ = operations.error(state, target)
     store_if_inside(history, 0, distance)
-    copy_row(state.row, saved[START])
-    perturb(operations, state, saved, progress, target, criteria)
-    k, turn, drawing = 0, 0, len(progress) > SPARE_ROWS + 1
+    k, extensions = 0, 0
     while True:
-        go_on(operations, state, saved, progress, k, target, criteria, history)
-        if total[STATE] == REACHED:
+        allowed = iterations_left(search, criteria, k, extensions)
+        go_on(operations, state, search, k, target, criteria, allowed, history)
+        if search.attempts[BEST]["ending"] == REACHED:
             break
-        if perturb(operations, state, saved, progress, target, criteria):
+        if perturb(operations, state, search, target, criteria):
             continue
-        if drawing:
-            k = begin_attempt(operations, state, saved, progress, target, criteria, k)
-            if k < 0:
-                begin_start(operations, state, saved, progress, phased)
-                k, drawing = 0, False
-            if drawing or phased:
-                continue
-        turn += 1
-        if phased and not begin_phase(operations, state, saved, progress, limits, turn):
-            break
-        if not phased and not extend_first(progress, criteria, limits, turn):
-            break
-    return int(total[COUNT]), total[STATE] <= STALLED
+        k = next_attempt(operations, state, search, target, criteria, extensions)
+        if k < 0:
+            extensions += 1
+            if not extend_first(operations, state, search, criteria, extensions):
+                break
+            k = 0
+    best = search.attempts[BEST]
+    return best["iterations"], best["ending"] <= STALLED
 
 
-def begin_rows(progress, criteria, in_reach, phased):
-    """Fill the rows of attempts to be made; the start has the patience of its phases.
-
-    Towards a target out of reach no attempt is given up.
-    """
-    others_follow = len(progress) > SPARE_ROWS + 1
-    for i in range(len(progress)):
-        reset(progress[i], PATIENCE if others_follow and in_reach else INFINITY)
-        progress[i, LIMIT] = criteria.max_iterations
-    progress[START, WAIT] = FIRST_PATIENCE if phased else INFINITY
-    if not others_follow:
-        progress[0, WAIT] = progress[START, WAIT]
+def first_phase(criteria):
+    """Return the index of the attempt that is the first phase, behind all if there are none."""
+    return criteria.restarts + 1 if criteria.restarts > 0 or criteria.phases == 1 else 0
 
 
-def perturb(operations, state, saved, progress, target, criteria):
+def attempt_count(criteria):
+    """Return the number of attempts."""
+    return first_phase(criteria) + (criteria.phases if criteria.phases > 1 else 0)
+
+
+def begin_search(operations, state, search, target, criteria):
+    """Begin with the start; no attempt at a target out of reach is given up."""
+    for k in range(len(search.attempts)):
+        attempt = search.attempts[k]
+        attempt["iterations"], attempt["ending"], attempt["merit"] = 0, LIMITED, INFINITY
+        patience = PATIENCE if k < first_phase(criteria) else PATIENCE_OF_PHASES
+        attempt["patience"] = patience if criteria.gives_up else INFINITY
+        attempt["milestone"], attempt["since"] = INFINITY, 0
+    save(state, search, START)
+    perturb(operations, state, search, target, criteria)
+
+
+def perturb(operations, state, search, target, criteria):
     """Move the first attempt and the start, once, if they are stuck; return whether they were."""
-    start, first = progress[START], progress[0]
-    if start[STATE] != LIMITED or progress[BEST, COUNT] != first[COUNT]:
+    start, first = search.attempts[START], search.attempts[0]
+    if start["ending"] == STALLED or search.attempts[BEST]["iterations"] != first["iterations"]:
         return False
     if not operations.perturb(state, target, criteria, first):
         return False
-    start[STATE], start[COUNT] = STALLED, first[COUNT]
-    copy_row(state.row, saved[START])
+    start["ending"] = STALLED
+    save(state, search, START)
     return True
 
 
-def begin_attempt(operations, state, saved, progress, target, criteria, k):
-    """Begin the attempt after attempt k, or an attempt given up; return its index, -1 if none."""
-    if k + 1 < len(progress) - SPARE_ROWS and progress[k + 1, COST] == INFINITY:
-        operations.draw(state, target, criteria, k + 1)
-        return k + 1
-    k = -1 if criteria.redraws_limbs else most_promising(progress)
+def next_attempt(operations, state, search, target, criteria, extensions):
+    """Begin the next attempt, or go on with the most promising; return its index, -1 if none."""
+    phases = first_phase(criteria)
+    for k in range(1, attempt_count(criteria)):
+        if search.attempts[k]["merit"] == INFINITY:
+            if k < phases:
+                operations.draw(state, target, criteria, k)
+                return k
+            if iterations_left(search, criteria, k, extensions) > 0:
+                resume(operations, state, search, START)
+                if k > phases:
+                    operations.shift(state, k - phases)
+                return k
+    k = most_promising(search, criteria, extensions)
     if k >= 0:
-        attempt = progress[k]
-        attempt[WAIT], attempt[MILESTONE], attempt[SINCE] = (
-            MORE_PATIENT * attempt[WAIT],
-            INFINITY,
-            0,
-        )
-        copy_row(saved[k], state.row)
-        operations.place(state)
+        attempt = search.attempts[k]
+        attempt["patience"] *= MORE_PATIENT
+        attempt["milestone"], attempt["since"] = INFINITY, 0
+        resume(operations, state, search, k)
     return k
 
 
-def begin_start(operations, state, saved, progress, phased):
-    """Begin at the start again, for all phases; of a single phase go on with the first attempt."""
-    copy_row(saved[START] if phased else saved[0], state.row)
-    if phased:
-        copy_row(progress[START], progress[0])
-    operations.place(state)
+def most_promising(search, criteria, extensions):
+    """Return the attempt given up to go on with: the least patient, then the best; -1 if none.
 
-
-def extend_first(progress, criteria, limits, n):
-    """Give the first attempt the iterations of the n-th; return whether the first needs more."""
-    progress[0, LIMIT] = (n + 1) * criteria.max_iterations
-    progress[0, WAIT] = INFINITY
-    return n <= limits.restarts and progress[0, STATE] == LIMITED
-
-
-def begin_phase(operations, state, saved, progress, limits, n):
-    """Begin phase n, behind the last go on with the best; return whether there is anything to do.
-
-    The phase before has just ended, and all phases have the iterations of one attempt together.
+    Where restarts redraw limbs, each has gone on from the attempt before.
     """
-    first, best = progress[0], progress[BEST_PHASE]
-    left = first[LIMIT] - first[COUNT]
-    if first[WAIT] == INFINITY or left <= 0.0:
-        return False
-    if first[COST] < best[COST]:
-        copy_row(first, best)
-        copy_row(saved[0], saved[BEST_PHASE])
-    copy_row(saved[START], state.row)
-    patience = FURTHER_PATIENCE
-    if n >= limits.phases or not operations.begin(state, n):
-        if best[STATE] == STALLED:
-            return False
-        copy_row(saved[BEST_PHASE], state.row)
-        patience = INFINITY
-    reset(first, patience)
-    first[LIMIT] = left
+    best, phases = -1, first_phase(criteria)
+    for k in range(attempt_count(criteria)):
+        attempt = search.attempts[k]
+        if attempt["ending"] == GIVEN_UP and not (k < phases and criteria.redraws_limbs):
+            rival = search.attempts[best]
+            sooner = best < 0 or attempt["patience"] < rival["patience"]
+            as_soon = attempt["patience"] == rival["patience"]
+            better = sooner or (as_soon and attempt["merit"] < rival["merit"])
+            if better and iterations_left(search, criteria, k, extensions) > 0:
+                best = k
+    return best
+
+
+def extend_first(operations, state, search, criteria, extensions):
+    """Go on from the start with as many iterations again; return whether they are allowed."""
+    first = search.attempts[0]
+    first["patience"] = INFINITY
+    resume(operations, state, search, 0)
+    return extensions <= criteria.extensions and first["ending"] in (LIMITED, GIVEN_UP)
+
+
+def iterations_left(search, criteria, k, extensions):
+    """Return how many iterations an attempt may make."""
+    most, phases, made = criteria.max_iterations, first_phase(criteria), 0
+    if k < phases:
+        return (1 + extensions if k == 0 else 1) * most - search.attempts[k]["iterations"]
+    for phase in range(phases, attempt_count(criteria)):
+        made += search.attempts[phase]["iterations"]
+    return most - made
+
+
+def save(state, search, k):
+    """Save where an attempt ended."""
+    copy_row(state.row, search.rows[k])
+
+
+def resume(operations, state, search, k):
+    """Bring the state to where an attempt ended."""
+    copy_row(search.rows[k], state.row)
     operations.place(state)
-    return True
 
 
-def reset(attempt, patience):
-    """Reset a row of progress to an attempt not yet made."""
-    attempt[COUNT], attempt[STATE], attempt[COST], attempt[WAIT] = 0.0, LIMITED, INFINITY, patience
-    attempt[MILESTONE], attempt[SINCE] = INFINITY, 0.0
-
-
-def go_on(operations, state, saved, progress, k, target, criteria, history):
+def go_on(operations, state, search, k, target, criteria, allowed, history):
     """Continue attempt k; save its end, and again if it is the best."""
-    attempt, total = progress[k], progress[BEST]
-    total[COUNT] += solve_once(
-        operations, state, target, criteria, attempt, history, int(total[COUNT])
+    attempt, best = search.attempts[k], search.attempts[BEST]
+    best["iterations"] += solve_once(
+        operations, state, target, criteria, attempt, allowed, history, best["iterations"]
     )
-    attempt[COST] = operations.merit(state, target)
-    copy_row(state.row, saved[k])
-    is_settled = attempt[COST] == total[COST] and total[STATE] == GIVEN_UP
-    if attempt[STATE] == REACHED or attempt[COST] < total[COST] or is_settled:
-        total[STATE], total[COST] = attempt[STATE], attempt[COST]
-        copy_row(state.row, saved[BEST])
+    attempt["merit"] = operations.merit(state, target)
+    save(state, search, k)
+    is_settled = attempt["merit"] == best["merit"] and best["ending"] == GIVEN_UP
+    if attempt["ending"] == REACHED or attempt["merit"] < best["merit"] or is_settled:
+        best["ending"], best["merit"] = attempt["ending"], attempt["merit"]
+        save(state, search, BEST)
 
 
-def solve_once(operations, state, target, criteria, attempt, history, earlier):
-    """Update until the target is reached, the error stalls, or the limit of iterations is met.
+def solve_once(operations, state, target, criteria, attempt, allowed, history, earlier):
+    """Update until the target is reached, the error stalls, or all iterations allowed are made.
 
-    `attempt` is the row of progress, where its end is noted; all attempts have made `earlier`
-    iterations so far.
+    The end is noted in the attempt; all attempts have made `earlier` iterations so far.
 
     Returns:
         The iterations made.
     """
     _, angle, total, bound = operations.error(state, target)
-    milestone, since = min(attempt[MILESTONE], total), attempt[SINCE]
-    first, ending = int(attempt[COUNT]), LIMITED
-    count = first
+    milestone, since = min(attempt["milestone"], total), attempt["since"]
+    count, ending = 0, LIMITED
     while ending == LIMITED:
         if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
-        if ending == REACHED or count >= attempt[LIMIT]:
+        if ending == REACHED or count >= allowed:
             break
         before = total
         operations.update(state, target)
         count += 1
         distance, angle, total, bound = operations.error(state, target)
-        store_if_inside(history, earlier + count - first, distance)
+        store_if_inside(history, earlier + count, distance)
         since += 1
         if total < PROGRESS * milestone:
             milestone, since = total, 0
         if abs(before - total) <= criteria.margin:
             ending = STALLED
-        elif since >= attempt[WAIT]:
+        elif since >= attempt["patience"]:
             ending = GIVEN_UP
     if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
         ending = REACHED
-    attempt[COUNT], attempt[STATE] = count, ending
-    attempt[MILESTONE], attempt[SINCE] = milestone, since
-    return count - first
-
-
-def most_promising(progress):
-    """Return the attempt given up to go on with: the least patient, then the best; -1 if none."""
-    best, row = -1, progress[0]
-    for k in range(len(progress) - SPARE_ROWS):
-        attempt = progress[k]
-        if attempt[STATE] == GIVEN_UP:
-            sooner = best < 0 or attempt[WAIT] < row[WAIT]
-            if sooner or (attempt[WAIT] == row[WAIT] and attempt[COST] < row[COST]):
-                best, row = k, attempt
-    return best
+    attempt["iterations"] += count
+    attempt["ending"], attempt["milestone"], attempt["since"] = ending, milestone, since
+    return count
 
 
 def copy_row(source, target):
@@ -308,19 +303,3 @@ def store_if_inside(row, i, value):
     """Write entry i of a row, if the entry exists."""
     if i < len(row):
         row[i] = value
-
-
-def fill_figures(figures, distance, angle, iterations, merit, lower_bound):
-    """Fill all figures but the outcome; no pose is nearer to the target than a bound [m]."""
-    figures[RESIDUAL], figures[RESIDUAL_ROTATION] = distance, angle
-    figures[ITERATIONS], figures[MERIT] = iterations, merit
-    figures[EXCESS] = max(0.0, distance - lower_bound)
-
-
-def outcome_of(reached, unreachable, stalled):
-    """Return how a solve ended; `unreachable` is whether geometry proves the target to be so."""
-    if reached:
-        return Outcome.CONVERGED
-    if unreachable:
-        return Outcome.UNREACHABLE if stalled else Outcome.UNREACHABLE_UNSETTLED
-    return Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT

@@ -1,37 +1,25 @@
-"""From arguments to the kernels of a solver, and from their results to a solution.
+"""From checked settings and targets to the kernels of a solver, and from results to a solution."""
 
-`solve_checked` accepts anything. For a single start and target its own steps take as long as the
-kernel, a third of a call on a chain of ten balls. `solve_plain` has fewer steps for float64 arrays
-of the right shape, and leaves all else to `solve_checked`.
-"""
-
-from typing import Any
+import math
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
-from ..arguments import (
-    FLOAT64,
-    LARGEST_COORDINATE,
-    SMALLEST_POSITIVE,
-    FloatArray,
-    RecordArray,
-    frozen,
-    is_plain,
-)
-from ..articulation import Articulation, one_batch
-from ..backend.compiled import Kernel
+from ..arguments import LARGEST_COORDINATE, FloatArray, frozen
+from ..articulation import Articulation
 from ..backend.threads import in_slices
-from ..model import coordinates_name, effector_of
+from ..model import coordinates_name
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
-from .mechanism import TARGET
-from .problem import CheckedTarget, IKSolution, Settings, Target, check_numbers
+from .mechanism import TARGET_WIDTH
+from .problem import CheckedTarget, IKSolution, Settings, check_numbers
 from .reach import least_distance
-from .reduce import prepare, store_prepared
-from .restarts import FIGURES, ITERATIONS, MERIT, OUTCOME, Limits, Result
+from .reduce import IKProblem, prepare, prepare_chain
+from .restarts import Limits
+from .result import FIGURE_COUNT, ITERATIONS, MERIT, OUTCOME, Result, result_on, result_size
 
 # Targets in a slice of a batch: fewer are not worth a thread, on a chain and on a mechanism.
 SLICE_ON_CHAINS, SLICE_ON_MECHANISMS = 128, 16
@@ -45,73 +33,8 @@ PROVEN = {
 }
 LARGEST_HISTORY = 10**9  # residuals; more fit no memory
 NO_HISTORY = frozen(np.empty(0))
-UNRECORDED = np.empty((1, 1))  # where kernels may write a history that is not read
-NAMES = (int, str, type(None))
-
-
-def solve_plain(
-    model: Any, start: Any, target: Any, effector: Any, settings: Settings
-) -> IKSolution | None:
-    """Return the solution for a single start and target, or None.
-
-    None where the arguments are no float64 arrays of the right shape, or not valid.
-    """
-    position: Any = target
-    rotation: Any = None
-    if type(target) is Target:
-        if effector is not None:
-            return None
-        position, rotation, effector, weight = target
-        if type(weight) is not float or not SMALLEST_POSITIVE <= weight <= LARGEST_COORDINATE:
-            return None
-    if settings.record or type(effector) not in NAMES or not is_plain(position, (3,)):
-        return None
-    if type(model) is Skeleton and rotation is None and not settings.limits.restarts:
-        count = model.joint_count
-        if not is_plain(start, (count, 4)):
-            return None
-        joint = count - 1 if effector is None else model.index(effector, "effector")
-        arrays = (*model.arrays, model.path_array(joint))
-        filled = run(
-            settings.solver.chain, arrays, start[None], position[None], count, None, settings
-        )
-        return _single_solution(NO_HISTORY, *filled) if filled else None
-    is_valid = type(model) is Articulation and (rotation is None or is_plain(rotation, (4,)))
-    if not is_valid or not is_plain(start, (model.coordinate_count,)):
-        return None
-    key = effector, rotation is not None, settings.limits.restarts, settings.seed
-    prepared = model.mechanisms.get(key)
-    if prepared is None:
-        prepared = prepare(model, (effector_of(model, effector),), (key[1],), *key[2:])
-        store_prepared(model, key, prepared)
-    targets = np.empty((1, 1), TARGET)
-    row = targets.view(FLOAT64)[0]  # of its fields one after the other
-    row[:3], row[3:7], row[7] = position, IDENTITY if rotation is None else rotation, 1.0
-    filled = run(
-        settings.solver.mechanism, (prepared.model,), start[None], targets, model.joint_count,
-        model.coordinate_count, settings,
-    )  # fmt: skip
-    if filled and filled[2].item(OUTCOME) in PROVEN:
-        joints = (effector_of(model, effector),)
-        prove_unreachable(model, joints, (key[1],), targets, filled[2], settings.limits)
-    return _single_solution(NO_HISTORY, *filled) if filled else None
-
-
-def prove_unreachable(
-    model: Articulation, joints: tuple[int, ...], oriented: tuple[bool, ...],
-    targets: RecordArray, figures: FloatArray, limits: Limits,
-) -> None:  # fmt: skip
-    """Change the outcomes of failed solves, where the first shell of an effector is the proof.
-
-    Targets are records TARGET, (target, effector); `figures` is that of Result.
-    """
-    for i, outcome in enumerate(figures[:, OUTCOME].tolist()):
-        if outcome in PROVEN:
-            pairs = zip(joints, oriented, targets[i].tolist(), strict=True)
-            for joint, is_oriented, (x, Q, _) in pairs:
-                gap, lever = least_distance(model, joint, x, Q if is_oriented else None, False)
-                if gap > limits.tolerance + lever * limits.tolerance_rotation:
-                    figures[i, OUTCOME] = PROVEN[outcome]
+# A problem, and the memory of its results.
+Results: TypeAlias = tuple[IKProblem, FloatArray]
 
 
 def solve_checked(
@@ -128,111 +51,131 @@ def solve_checked(
         ValueError: naming a number which a kernel has refused.
         FloatingPointError: if a frame is wrong from which the next frame starts.
     """
-    is_skeleton, name = isinstance(model, Skeleton), coordinates_name(model)
+    name = coordinates_name(model)
     shape = (model.joint_count, 4) if isinstance(model, Skeleton) else (model.coordinate_count,)
     starts = arguments.floats(name, start, "...", *shape)
     batch = batch_shape(starts.shape[: -len(shape)], targets, name)
-    starts = _rows(starts, batch, len(shape))
-    on_chain = is_skeleton and len(targets) == 1 and targets[0].rotation is None
-    rows: np.ndarray
-    if on_chain:
-        rows = arguments.spread(targets[0].position, (*batch, 3)).reshape(-1, 3)
-    else:
-        rows = target_rows(targets, batch)
-    result = _run_checked(model, starts, targets, rows, settings)
-    if result is None:
-        check_numbers(targets)
-        if isinstance(model, Articulation):
-            model.checked(name, start)
-        else:
-            rotation.unit(name, start)
-        if settings.limits.chained:
-            limit = f"{LARGEST_COORDINATE:g}"
-            raise FloatingPointError(f"track: a frame left the numbers up to {limit}")
-        raise ValueError(
-            f"{name}: expected quaternions within 1e-6 of unit length, got one just off"
-        )
-    if on_chain and settings.limits.restarts:
-        rows = target_rows(targets, batch)
-        result = _restarted(model, starts, targets, rows, result, settings)
-    return _solution(result, batch, settings)
+    if starts.ndim > len(shape):
+        starts = arguments.spread(starts, (*batch, *shape))
+    on_chain = isinstance(model, Skeleton) and len(targets) == 1 and targets[0].rotation is None
+    solve = _solve_chains if on_chain else _solve_mechanisms
+    results = solve(model, starts.reshape(-1), targets, batch, settings)
+    if results is None:
+        raise _refusal(model, start, targets, settings)
+    return _solution(*results, batch, isinstance(model, Skeleton), settings.record)
 
 
-def _run_checked(
-    model: Skeleton | Articulation,
-    starts: FloatArray,
-    targets: list[CheckedTarget],
-    rows: np.ndarray,
+def _solve_chains(
+    skeleton: Any, starts: FloatArray, targets: list[CheckedTarget], batch: tuple[int, ...],
     settings: Settings,
-) -> Result | None:
-    """Return the result of a kernel for rows of starts and targets; None if some is not valid."""
-    count = model.joint_count
-    if isinstance(model, Skeleton) and rows.dtype == FLOAT64:
-        arrays = (*model.arrays, model.path_array(targets[0].joint))
-        filled = run(settings.solver.chain, arrays, starts, rows, count, None, settings)
-        return Result(*filled) if filled else None
-    articulation = balls(model) if isinstance(model, Skeleton) else model
+) -> Results | None:  # fmt: skip
+    """Return the results on a chain of unlimited balls; None if some number is not valid."""
+    (target,) = targets
+    positions = arguments.spread(target.position, (*batch, 3)).reshape(-1)
+    problem = prepare_chain(skeleton, target.joint)
+    memory = run(problem, starts, positions, settings)
+    if memory is None:
+        return None
+    if settings.limits.restarts:
+        rows = target_rows(targets, batch)
+        first = result_on(memory, len(positions) // 3, problem.joints, 0)
+        _restart(skeleton, target.joint, starts, rows, first, settings)
+    return problem, memory
+
+
+def _solve_mechanisms(
+    model: Any, starts: FloatArray, targets: list[CheckedTarget], batch: tuple[int, ...],
+    settings: Settings,
+) -> Results | None:  # fmt: skip
+    """Return the results on a mechanism; None if some number is not valid."""
     effectors = tuple([target.joint for target in targets])
     oriented = tuple([target.rotation is not None for target in targets])
+    return run_mechanism(model, effectors, oriented, starts, target_rows(targets, batch), settings)
+
+
+def run_mechanism(
+    model: Skeleton | Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...],
+    starts: FloatArray, rows: FloatArray, settings: Settings,
+) -> Results | None:  # fmt: skip
+    """Return the results for rows of targets; None if some number is not valid."""
+    articulation = balls(model) if isinstance(model, Skeleton) else model
     restarts, seed = settings.limits.restarts, settings.seed
-    arrays = prepare(articulation, effectors, oriented, restarts, seed).model
-    width = articulation.coordinate_count
-    starts = starts.reshape(len(starts), width)
-    filled = run(settings.solver.mechanism, (arrays,), starts, rows, count, width, settings)
-    if not filled:
+    problem = prepare(articulation, effectors, oriented, restarts, seed)
+    memory = run(problem, starts, rows, settings)
+    if memory is None:
         return None
-    result = Result(*filled)
-    prove_unreachable(articulation, effectors, oriented, rows, result.figures, settings.limits)
-    if articulation is model:
-        return result
-    local = result.coordinates.reshape(result.local.shape)
-    return result._replace(local=local, coordinates=local)
+    prove_unreachable(articulation, problem, rows, memory, settings.limits)
+    return problem, memory
 
 
 def run(
-    kernel: Kernel,
-    arrays: tuple[Any, ...],
-    starts: FloatArray,
-    targets: np.ndarray,
-    joints: int,
-    coordinates: int | None,
-    settings: Settings,
-) -> tuple[FloatArray, ...]:
-    """Return the fields of Result as a kernel fills them; none if some number is not valid.
+    problem: IKProblem, starts: FloatArray, targets: FloatArray, settings: Settings
+) -> FloatArray | None:
+    """Return the results of a kernel, see `result_on`; None if some number is not valid.
 
-    `arrays` are the model's, read by the kernel. The starts are rows, (target, ...), or a single
-    row for all targets. The targets are positions [m], (target, 3), of a mechanism records TARGET,
-    (target, effector). `coordinates` is how many a solution on a mechanism has, None on a chain.
+    Starts and targets are one after the other in a row; a single start is for all targets.
     """
-    n, history = len(targets), UNRECORDED
-    local, positions = np.empty((n, joints, 4)), np.empty((n, joints, 3))
-    figures = np.empty((n, len(FIGURES)))
-    if settings.record:
-        rounds = settings.limits.restarts * (1 if coordinates is None else 2) + 1
-        columns = rounds * max(settings.limits.max_iterations, settings.limits.far_iterations)
+    is_chain, limits = problem.mechanism is None, settings.limits
+    n = len(targets) // (3 if is_chain else TARGET_WIDTH * len(problem.effectors))
+    columns = 1
+    if settings.record:  # a chain leaves room for the restarts of its mechanism
+        rounds = limits.restarts * (3 if is_chain else 2) + 2
+        columns += rounds * max(limits.max_iterations, limits.far_iterations)
         if n * columns > LARGEST_HISTORY:
             raise ValueError(
                 f"max_iterations: expected at most {LARGEST_HISTORY:,} residuals to record, got "
                 f"{n} times {columns}"
             )
-        history = np.empty((n, columns + 1))
-    rows: tuple[np.ndarray, ...]
-    if coordinates is None:
-        q, slice_length = local, SLICE_ON_CHAINS
-        rows = starts, targets, local, positions, figures, history
+    memory = np.empty(n * result_size(problem.joints, problem.coordinates, columns))
+    kernel = settings.solver.chain if is_chain else settings.solver.mechanism
+    given = problem.memory, settings.numbers, starts, targets, memory
+    minimum = SLICE_ON_CHAINS if is_chain else SLICE_ON_MECHANISMS
+    if n < 2 * minimum or limits.chained:
+        valid = kernel(*given, 0, n)
     else:
-        q, slice_length = np.empty((n, coordinates)), SLICE_ON_MECHANISMS
-        rows = starts, targets, local, positions, figures, history, q
-    if n < 2 * slice_length or settings.limits.chained:
-        valid = kernel(*arrays, settings.numbers, *rows)
+        valid = all(
+            in_slices(kernel, n, lambda part: (*given, part.start, part.stop), minimum=minimum)
+        )
+    return memory if valid else None
+
+
+def prove_unreachable(
+    model: Articulation, problem: IKProblem, targets: FloatArray, memory: FloatArray,
+    limits: Limits,
+) -> None:  # fmt: skip
+    """Change the outcomes of failed solves, where the first shell of an effector is the proof.
+
+    Targets are rows as of `target_rows`; the memory is that of results.
+    """
+    n = len(targets) // (TARGET_WIDTH * len(problem.effectors))
+    begin = 7 * n * problem.joints
+    if n == 1 and memory.item(begin + OUTCOME) not in PROVEN:
+        return
+    figures = memory[begin : begin + FIGURE_COUNT * n].reshape(n, FIGURE_COUNT)
+    for i, outcome in enumerate(figures[:, OUTCOME].tolist()):
+        if outcome in PROVEN:
+            rows = targets.reshape(n, -1, TARGET_WIDTH)[i].tolist()
+            for joint, oriented, row in zip(problem.effectors, problem.oriented, rows, strict=True):
+                Q = row[3:7] if oriented else None
+                gap, lever = least_distance(model, joint, row[:3], Q, False)
+                if gap > limits.tolerance + lever * limits.tolerance_rotation:
+                    figures[i, OUTCOME] = PROVEN[outcome]
+
+
+def _refusal(
+    model: Skeleton | Articulation, start: ArrayLike, targets: list[CheckedTarget],
+    settings: Settings,
+) -> Exception:  # fmt: skip
+    """Raise, or return, the error of numbers that a kernel has refused."""
+    name = coordinates_name(model)
+    check_numbers(targets)
+    if isinstance(model, Articulation):
+        model.checked(name, start)
     else:
-
-        def arguments_of(part: slice) -> tuple[Any, ...]:
-            parts = [values if len(values) == 1 else values[part] for values in rows]
-            return (*arrays, settings.numbers, *parts)
-
-        valid = all(in_slices(kernel, n, arguments_of, minimum=slice_length))
-    return (local, positions, figures, history, q) if valid else ()
+        rotation.unit(name, start)
+    if settings.limits.chained:
+        return FloatingPointError(f"track: a frame left the numbers up to {LARGEST_COORDINATE:g}")
+    return ValueError(f"{name}: expected quaternions within 1e-6 of unit length, got one just off")
 
 
 def balls(skeleton: Skeleton) -> Articulation:
@@ -243,17 +186,16 @@ def balls(skeleton: Skeleton) -> Articulation:
     return cache["balls"]
 
 
-def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> RecordArray:
-    """Return targets as records TARGET, (target, effector), the largest weight 1."""
-    count, heaviest = len(targets), max([target.weight for target in targets])
-    rows = np.empty((*batch, count), TARGET)
-    for effector, target in enumerate(targets):
-        rows["position"][..., effector, :] = target.position
-        rows["rotation"][..., effector, :] = (
-            IDENTITY if target.rotation is None else target.rotation
-        )
-        rows["weight"][..., effector] = target.weight / heaviest
-    return rows.reshape(-1, count)
+def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> FloatArray:
+    """Return targets as a row of records TARGET, effector by effector, the largest weight 1."""
+    heaviest = max([target.weight for target in targets])
+    rows = np.empty((*batch, TARGET_WIDTH * len(targets)))
+    for effector, (_, x, Q, weight) in enumerate(targets):
+        at = TARGET_WIDTH * effector
+        rows[..., at : at + 3] = x
+        rows[..., at + 3 : at + 7] = IDENTITY if Q is None else Q
+        rows[..., at + 7] = weight / heaviest
+    return rows.reshape(-1)
 
 
 def batch_shape(
@@ -270,38 +212,31 @@ def batch_shape(
     return batch
 
 
-def _rows(starts: FloatArray, batch: tuple[int, ...], axes: int) -> FloatArray:
-    """Return the starts as rows: a row for each target of a batch, or a single row."""
-    if starts.ndim == axes:
-        return starts[None]
-    return one_batch(arguments.spread(starts, (*batch, *starts.shape[-axes:])), axes)
-
-
-def _restarted(
-    skeleton: Any,
-    starts: FloatArray,
-    targets: list[CheckedTarget],
-    rows: np.ndarray,
-    first: Result,
+def _restart(
+    skeleton: Skeleton, effector: int, starts: FloatArray, rows: FloatArray, first: Result,
     settings: Settings,
-) -> Result:
-    """Return the better of first results and restarts, where a target in reach is not reached.
+) -> None:  # fmt: skip
+    """Put restarts in place of worse results, where a target in reach is not reached.
 
     A start on a chain of unlimited balls has already had the iterations of all attempts. Towards a
     target out of reach every start comes to the same nearest point.
     """
     unsolved = np.flatnonzero(~np.isin(first.figures[:, OUTCOME], FINAL_OUTCOMES))
     if not len(unsolved):
-        return first
-    starts = starts[unsolved] if len(starts) > 1 else starts
-    more = _run_checked(skeleton, starts, targets, rows[unsolved], settings)
-    assert more is not None, "both kernels accept the same starts and targets"
-    history, counts = first.history, first.figures[unsolved, ITERATIONS].astype(np.int64)
+        return
+    n = len(first.figures)
+    if starts.size > first.local[0].size:
+        starts = starts.reshape(n, -1)[unsolved].reshape(-1)
+    remaining = rows.reshape(n, -1)[unsolved].reshape(-1)
+    results = run_mechanism(skeleton, (effector,), (False,), starts, remaining, settings)
+    assert results is not None, "both kernels accept the same starts and targets"
+    problem, memory = results
+    more = result_on(memory, len(unsolved), problem.joints, problem.coordinates)
+    counts = first.figures[unsolved, ITERATIONS].astype(np.int64)
     if settings.record:  # the residuals of the first results, then those of their restarts
-        columns = np.empty((len(history), more.history.shape[1] - 1))
-        history = np.concatenate([history, columns], axis=1)
         for row, count, residuals in zip(unsolved, counts, more.history, strict=True):
-            history[row, count + 1 : count + len(residuals)] = residuals[1:]
+            history = first.history[row, count + 1 :]
+            history[:] = residuals[1 : 1 + len(history)]
     iterations = counts + more.figures[:, ITERATIONS]
     is_better = (more.figures[:, OUTCOME] == Outcome.CONVERGED) | (
         more.figures[:, MERIT] < first.figures[unsolved, MERIT]
@@ -310,48 +245,40 @@ def _restarted(
     for values, replacements in zip(first[:3], more[:3], strict=True):
         values[better] = replacements[is_better]
     first.figures[unsolved, ITERATIONS] = iterations
-    return first._replace(history=history)
 
 
-def _solution(result: Result, batch: tuple[int, ...], settings: Settings) -> IKSolution:
-    """Return the results as a solution in the shape of the batch."""
-    local, positions, figures, history, q = result
-    if settings.record:  # up to the longest, each continued by its last residual
-        iterations = figures[:, ITERATIONS].astype(np.int64)
-        count = np.arange(int(iterations.max(initial=0)) + 1)
-        history = np.take_along_axis(history, np.minimum(count, iterations[:, None]), axis=1)
-    if not batch:
-        return _single_solution(frozen(history[0]) if settings.record else NO_HISTORY, *result)
+def _solution(
+    problem: IKProblem, memory: FloatArray, batch: tuple[int, ...], is_skeleton: bool, record: bool
+) -> IKSolution:
+    """Return the results as a solution in the shape of the batch, all read-only."""
+    joints, coordinates = problem.joints, problem.coordinates
+    memory.setflags(write=False)
+    if not (batch or record):
+        a, b = 4 * joints, 7 * joints
+        c = b + FIGURE_COUNT
+        pose, x = memory[:a].reshape(joints, 4), memory[a:b].reshape(joints, 3)
+        residual, angle, steps, outcome, merit, excess = memory[b:c].tolist()
+        q = pose if is_skeleton else memory[c : c + coordinates]
+        return IKSolution(
+            pose, x, residual, int(steps), OUTCOMES[outcome], NO_HISTORY, angle, q, merit, excess
+        )
+    result, history = result_on(memory, math.prod(batch), joints, coordinates), NO_HISTORY
+    count = result.figures[:, ITERATIONS].astype(np.int64)
+    if record:  # up to the longest, each continued by its last residual
+        row = np.arange(int(count.max(initial=0)) + 1)
+        history = np.take_along_axis(result.history, np.minimum(row, count[:, None]), axis=1)
+        history = frozen(history.reshape(*batch, len(row)))
 
     def shaped(values: Any) -> Any:
         return frozen(values.reshape(batch + values.shape[1:]))
 
-    residual, angle, steps, outcome, merit, excess = figures.T.copy()
+    local = shaped(result.local)
+    residual, angle, _, outcome, merit, excess = map(shaped, result.figures.T.copy())
+    steps, outcome = shaped(count), shaped(result.figures[:, OUTCOME].astype(np.int64))
+    if not batch:
+        residual, angle, merit, excess = map(float, (residual, angle, merit, excess))
+        steps, outcome = int(steps), OUTCOMES[int(outcome)]
+    q = local if is_skeleton else shaped(result.coordinates)
     return IKSolution(
-        shaped(local), shaped(positions), shaped(residual), shaped(steps.astype(np.int64)),
-        shaped(outcome.astype(np.int64)), shaped(history) if settings.record else NO_HISTORY,
-        shaped(angle), shaped(q), shaped(merit), shaped(excess),
-    )  # fmt: skip
-
-
-def _single_solution(
-    shown_history: FloatArray,
-    local: FloatArray,
-    positions: FloatArray,
-    figures: FloatArray,
-    _history: FloatArray,
-    coordinates: FloatArray,
-) -> IKSolution:
-    """Return the solution of the only target, with its history."""
-    pose, x = local[0], positions[0]
-    pose.setflags(False)  # by its name it takes twice as long
-    x.setflags(False)
-    q = pose
-    if coordinates is not local:
-        q = coordinates[0]
-        q.setflags(False)
-    residual, angle, iterations, outcome, merit, excess = figures.tolist()[0]
-    return IKSolution(
-        pose, x, residual, int(iterations), OUTCOMES[outcome], shown_history, angle, q, merit,
-        excess,
-    )  # fmt: skip
+        local, shaped(result.positions), residual, steps, outcome, history, angle, q, merit, excess
+    )

@@ -3,14 +3,16 @@
 The textbook forms of the solvers on a chain are four times faster than on a mechanism.
 """
 
+from typing import Any
+
 import numpy as np
 
-from ..arguments import LARGEST_COORDINATE
-from ..backend.compiled import Kernel, bind
+from ..arguments import LARGEST_COORDINATE, FloatArray
+from ..backend.memory import packed, part
 from ..kinematics import forward_pose, normalise
 from ..quaternion import load_vector, norm, subtract
-from .anderson import DEPTH, forget
-from .ccd import anderson_ccd_sweep, ccd_sweep
+from ..skeleton import Skeleton
+from .anderson import forget
 from .chain import (
     bend,
     effector_error,
@@ -24,65 +26,66 @@ from .chain import (
     rounding,
     store_local,
 )
-from .fabrik import fabrik_sweep
-from .jacobian import (
-    damped_least_squares_sweep,
-    jacobian_transpose_sweep,
-    levenberg_marquardt_sweep,
-)
 from .restarts import (
-    COUNT,
-    LIMIT,
-    OUTCOME,
-    SPARE_ROWS,
+    BEST,
     Criteria,
     Operations,
     copy_row,
-    fill_figures,
     limits_of,
-    outcome_of,
+    new_search,
     solve_with_restarts,
 )
+from .result import OUTCOME, fill_figures, outcome_of, result_on
 
 
-def solve_chains(
-    parents, offsets, path, numbers, starts, targets, local, positions, figures, history
-):
-    """Solve target after target; return whether all starts and targets were valid.
+def packed_chain(skeleton: Skeleton, effector: int) -> FloatArray:
+    """Return what `solve_chains` reads of a skeleton and its effector."""
+    return packed(*skeleton.arrays, skeleton.path_array(effector))
 
-    Arrays come separately, since tuples take longer from Python. The first are the skeleton's, the
-    joints from the root to the effector, and the numbers of Limits. Then come the local rotations
-    to start from, (start, joint, 4), used by the targets in turn, and the global positions [m],
-    (target, 3). The last are the fields of Result except its coordinates.
+
+def solve_chains(operations, depth, problem, numbers, starts, targets, results, first, last):
+    """Solve the targets from `first` to `last`; return whether starts and targets were valid.
+
+    Args:
+        operations: of a solver, on a Chain.
+        depth: how many sweeps the solver remembers.
+        problem: see `packed_chain`.
+        numbers: of Limits.
+        starts: local rotations, of one start or of as many as targets, row after row.
+        targets: global positions [m], row after row.
+        results: see `result_on`.
+        first: index of the first target.
+        last: index behind the last.
     """
-    limits = limits_of(numbers)
-    chain = new_chain(offsets, path, depth)
-    count = 1 + SPARE_ROWS
-    saved, progress = np.empty((count, len(chain.row))), np.empty((count, LIMIT + 1))
-    rotations = np.empty((len(parents), 4))
-    for i in range(len(targets)):
-        pose, target = local[i], load_vector(targets, i)
-        start = local[i - 1] if limits.chained and i > 0 else starts[i % len(starts)]
+    parents, path = part(problem, 0, np.int64), part(problem, 2, np.int64)
+    joints = len(parents)
+    offsets = part(problem, 1, np.float64).reshape(joints, 3)
+    start_rows, target_rows = starts.reshape(-1, joints, 4), targets.reshape(-1, 3)
+    result = result_on(results, len(target_rows), joints, 0)
+    limits, chain = limits_of(numbers), new_chain(offsets, path, depth)
+    search, rotations = new_search(1, len(chain.row)), np.empty((joints, 4))
+    for i in range(first, last):
+        pose, target = result.local[i], load_vector(target_rows, i)
+        is_chained = limits.chained and i > 0
+        start = result.local[i - 1] if is_chained else start_rows[i % len(start_rows)]
         if not (normalise(start, pose) and is_within(target, LARGEST_COORDINATE)):
             return False
         pose_chain(chain, path, pose)
         forget(chain.mixing)
         d = root_distance(chain, target)
-        criteria, past = chain_criteria(chain, d, limits), history[i % len(history)]
-        iterations, stalled = solve_with_restarts(
-            operations, chain, saved, progress, target, limits, criteria, past
-        )
+        criteria, past = chain_criteria(chain, d, limits), result.history[i]
+        iterations, stalled = solve_with_restarts(operations, chain, search, target, criteria, past)
         if iterations > 0:
-            copy_row(saved[-1], chain.row)
+            copy_row(search.rows[BEST], chain.row)
             rotate_links(chain)
             store_local(chain, path, pose)
-        forward_pose(parents, offsets, pose, positions[i], rotations)
-        distance = norm(subtract(load_vector(positions[i], path[-1]), target))
+        positions, figures = result.positions[i], result.figures[i]
+        forward_pose(parents, offsets, pose, positions, rotations)
+        distance = norm(subtract(load_vector(positions, path[-1]), target))
         bound = least_distance(chain, d)
-        fill_figures(figures[i], distance, 0.0, iterations, distance, bound)
+        fill_figures(figures, distance, 0.0, iterations, distance, bound)
         unreachable = bound > limits.tolerance + rounding(chain, d)
-        outcome = outcome_of(distance <= limits.tolerance, unreachable, stalled)
-        figures[i, OUTCOME] = outcome.value
+        figures[OUTCOME] = outcome_of(distance <= limits.tolerance, unreachable, stalled).value
     return True
 
 
@@ -97,7 +100,9 @@ def chain_criteria(chain, d, limits):
     slack = min(8.0 * margin, 0.5 * limits.tolerance)
     count = limits.far_iterations if bound > limits.tolerance else limits.max_iterations
     distance = bound + limits.tolerance - slack
-    return Criteria(distance, limits.tolerance_rotation, margin, count, False)
+    return Criteria(
+        distance, limits.tolerance_rotation, margin, count, 0, 1, limits.restarts, False, False
+    )
 
 
 def chain_error(chain, target):
@@ -108,7 +113,7 @@ def chain_error(chain, target):
 
 def perturb_chain(chain, target, criteria, first):
     """Bend a chain that starts collinear with its target: no solver would leave the line."""
-    if first[COUNT] > 0 or effector_error(chain, target) <= criteria.distance:
+    if first["iterations"] > 0 or effector_error(chain, target) <= criteria.distance:
         return False
     if is_beyond_reach(chain, root_distance(chain, target)) or not is_collinear(chain, target):
         return False
@@ -124,32 +129,12 @@ def draw_chain(_chain, _target, _criteria, _n):
     """Leave a chain unchanged: its random restarts are made on a mechanism."""
 
 
-def begin_sweeps(_chain, n):
-    """Return whether phase n is the only one."""
-    return n == 0
+def shift_chain(_chain, _n):
+    """Leave a chain unchanged: its solvers have no phases."""
 
 
-depth = 0  # of the sweeps that a solver remembers
-operations = Operations(
-    ccd_sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain, begin_sweeps
-)
-SWEEPS = {
-    "ccd": ccd_sweep,
-    "fabrik": fabrik_sweep,
-    "levenberg_marquardt": levenberg_marquardt_sweep,
-    "damped_least_squares": damped_least_squares_sweep,
-    "jacobian_transpose": jacobian_transpose_sweep,
-    "anderson_ccd": anderson_ccd_sweep,
-}
-# The kernel that solves chains by the sweep of each solver.
-ON_CHAINS = {
-    name: Kernel(
-        bind(
-            solve_chains,
-            operations=operations._replace(update=sweep),
-            depth=DEPTH * (sweep is anderson_ccd_sweep),
-        ),
-        label=f"{name} for chains",
+def on_chains(sweep: Any) -> Operations:
+    """Return the operations of a solver that makes such a sweep."""
+    return Operations(
+        sweep, chain_error, effector_error, perturb_chain, place_chain, draw_chain, shift_chain
     )
-    for name, sweep in SWEEPS.items()
-}

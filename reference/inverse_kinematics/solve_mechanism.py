@@ -1,7 +1,7 @@
 """Any targets of any mechanism, for the loops of `restarts.py`."""
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from ..articulation import (
     joint_transform,
     normalise_start,
 )
-from ..backend.compiled import Kernel, bind
 from ..quaternion import (
     load_quaternion,
     load_vector,
@@ -30,30 +29,25 @@ from ..quaternion import (
     store_quaternion,
     subtract,
 )
-from .anderson import DEPTH, Mixing, forget, mixing_on, mixing_size
-from .bounded_step import TaskSystem, new_system
-from .ccd import anderson_ccd_update, ccd_update
+from .anderson import Mixing, forget, mixing_on, mixing_size
+from .bounded_step import FULL_CIRCLE, TaskSystem, new_system
 from .chain import BEND, POSITION_ROUNDING
-from .fabrik import BACKWARD, fabrik_update
-from .jacobian import (
-    damped_least_squares_update,
-    jacobian_transpose_update,
-    levenberg_marquardt_phase,
-    levenberg_marquardt_update,
-    only_phase,
-)
-from .linear_algebra import clear
+from .far_step import FAR_STEP
 from .mechanism import (
+    BACKWARD,
     LEVER,
+    TARGET,
+    TARGET_WIDTH,
     ConfigurationData,
     Mechanism,
-    data_on,
     errors,
     gather,
     least_residual,
     load_ball,
     merit_of,
     move_by,
+    new_data,
+    problem_on,
     residuals,
     scatter,
     store_ball,
@@ -61,22 +55,17 @@ from .mechanism import (
     update_forward_kinematics,
 )
 from .restarts import (
-    COST,
-    COUNT,
+    BEST,
     INFINITY,
-    LIMIT,
-    OUTCOME,
-    SPARE_ROWS,
     STALLED,
-    STATE,
     Criteria,
     Operations,
     copy_row,
-    fill_figures,
     limits_of,
-    outcome_of,
+    new_search,
     solve_with_restarts,
 )
+from .result import OUTCOME, fill_figures, outcome_of, result_on
 
 # A start is stuck if it stalls within so few iterations away from its target. An example is a
 # straight chain, perhaps folded since, with its target on its own line.
@@ -101,68 +90,95 @@ class MechanismState(NamedTuple):
 
     mechanism: Mechanism  # what moves
     data: ConfigurationData  # its configuration
-    row: FloatArray  # what an attempt continues from: `data.state` and `mixing`
+    row: FloatArray  # the coordinates of this configuration
+    far_step: RecordArray  # the last step towards a target out of reach, FAR_STEP, (1,)
     mixing: Mixing  # the last sweeps, of an accelerated solver
     workspace: Workspace  # of the solver
     restarts: FloatArray  # coordinates of the mechanism for further attempts, (restart, coordinate)
     # the effectors of these restarts, positions [m] and rotations, (restart, effector, 7)
     effector_frames: FloatArray
     ranks: FloatArray  # how far the restarts not yet taken are from the target [m], (restart,)
+    shares: FloatArray  # of the ranges of joints at further starts, (phase - 1, joint)
 
 
-def solve_mechanisms(
-    model, numbers, starts, targets, local, positions, figures, history, coordinates
-):
-    """Solve target after target; return whether all starts and targets were valid.
-
-    The model is a plain tuple, since named tuples take longer from Python: the joints of the
-    articulation, the fields of Mechanism, and the restarts of MechanismState with their effectors.
-    Then come the numbers of Limits, and coordinates of the articulation to start from, (start,
-    coordinate), used by the targets in turn. The targets are records TARGET, (target, effector),
-    made unit here. The last are the fields of Result.
-    """
-    joints, mechanism_fields, restarts, restart_frames = model
-    limits, mechanism = limits_of(numbers), Mechanism(*mechanism_fields)
-    n = len(mechanism.columns)
-    row = np.zeros(n + 5 + mixing_size(n, depth))
-    data, mixing = data_on(mechanism, row[: n + 5]), mixing_on(row[n + 5 :], n, depth)
+def new_state(mechanism, depth, restarts, effector_frames, shares):
+    """Return the state of a mechanism whose solver remembers `depth` sweeps, not filled."""
+    data, n = new_data(mechanism), len(mechanism.columns)
+    mixing = mixing_on(np.empty(mixing_size(n, depth)), n, depth)
     if depth > 0:
         scale_lengths(mechanism, mixing.scale)
-    state = MechanismState(
-        mechanism, data, row, mixing, new_workspace(mechanism), restarts, restart_frames,
-        np.empty(len(restarts)),
+    return MechanismState(
+        mechanism, data, data.q, np.zeros(1, FAR_STEP), mixing, new_workspace(mechanism), restarts,
+        effector_frames, np.empty(len(restarts)), shares,
     )  # fmt: skip
-    saved = np.empty((len(restarts) + 1 + SPARE_ROWS, len(row)))
-    progress, rotations = np.empty((len(saved), LIMIT + 1)), np.empty((len(joints), 4))
-    for i in range(len(targets)):
-        q, target = coordinates[i], targets[i]
-        chained = limits.chained and i > 0
-        copy_row(coordinates[i - 1] if chained else starts[i % len(starts)], q)
+
+
+def solve_mechanisms(operations, depth, problem, numbers, starts, targets, results, first, last):
+    """Solve the targets from `first` to `last`; return whether starts and targets were valid.
+
+    Args:
+        operations: of a solver, on a MechanismState.
+        depth: how many sweeps the solver remembers.
+        problem: see `packed_problem`.
+        numbers: of Limits.
+        starts: coordinates of the articulation, of one start or of as many as targets, row after
+            row.
+        targets: records TARGET as numbers, (target, effector, 8), made unit here.
+        results: see `result_on`.
+        first: index of the first target.
+        last: index behind the last.
+    """
+    joints, width, mechanism, restarts, effector_frames, shares = problem_on(problem)
+    limits, numbers_of_target = limits_of(numbers), TARGET_WIDTH * len(mechanism.effectors)
+    start_rows, target_rows = (
+        starts.reshape(max(len(starts) // max(width, 1), 1), width),
+        targets.reshape(-1, numbers_of_target),
+    )
+    result = result_on(results, len(target_rows), len(joints), width)
+    state = new_state(mechanism, depth, restarts, effector_frames, shares)
+    search = new_search(1 + len(restarts) + limits.phases, len(state.row))
+    rotations = np.empty((len(joints), 4))
+    for i in range(first, last):
+        q, target = result.coordinates[i], target_rows[i].view(TARGET)
+        is_chained = limits.chained and i > 0
+        copy_row(result.coordinates[i - 1] if is_chained else start_rows[i % len(start_rows)], q)
         if not (normalise_start(joints, q) and normalise_target(target)):
             return False
-        for j in range(len(joints)):  # also joints that move no effector
-            clamp_joint(joints, j, q)
-        gather(mechanism, q, data.q)
-        clear(data.far_step)
-        forget(mixing)
-        update_forward_kinematics(mechanism, data)
+        begin_solve(joints, state, q)
         bound = least_residual(mechanism, target)
-        criteria, past = mechanism_criteria(mechanism, bound, limits), history[i % len(history)]
+        criteria = mechanism_criteria(mechanism, bound, limits)
         iterations, stalled = solve_with_restarts(
-            operations, state, saved, progress, target, limits, criteria, past
+            operations, state, search, target, criteria, result.history[i]
         )
-        scatter(mechanism, saved[-1], q)
-        articulated_pose(joints, q, positions[i], rotations)
-        for j in range(len(joints)):
-            _, Q = joint_transform(joints, j, q)
-            store_quaternion(local[i], j, Q)
-        place_effectors(mechanism, data, positions[i], rotations)
+        scatter(mechanism, search.rows[BEST], q)
+        show_pose(joints, state, q, result.positions[i], rotations, result.local[i])
         distance, angle, _, _ = residuals(state, target)
-        merit = merit_of(state, target)
-        fill_figures(figures[i], distance, angle, iterations, merit, bound)
+        figures, merit = result.figures[i], merit_of(state, target)
+        fill_figures(figures, distance, angle, iterations, merit, bound)
         reached = distance <= limits.tolerance and angle <= limits.tolerance_rotation
-        figures[i, OUTCOME] = outcome_of(reached, bound > limits.tolerance, stalled).value
+        figures[OUTCOME] = outcome_of(reached, bound > limits.tolerance, stalled).value
     return True
+
+
+def begin_solve(joints, state, q):
+    """Bring the coordinates of an articulation within the limits, and its mechanism to them."""
+    for j in range(len(joints)):  # also joints that move no effector
+        clamp_joint(joints, j, q)
+    gather(state.mechanism, q, state.data.q)
+    place_mechanism(state)
+
+
+def show_pose(joints, state, q, positions, rotations, local):
+    """Fill the pose of an articulation at q, and put the effectors where this pose has them."""
+    articulated_pose(joints, q, positions, rotations)
+    for j in range(len(joints)):
+        _, Q = joint_transform(joints, j, q)
+        store_quaternion(local, j, Q)
+    effectors = state.mechanism.effectors
+    for e in range(len(effectors)):
+        j = effectors["source"][e]
+        x, R = load_vector(positions, j), load_quaternion(rotations, j)
+        store_effector(state.mechanism, state.data, e, x, R)
 
 
 def new_workspace(mechanism):
@@ -201,28 +217,25 @@ def mechanism_criteria(mechanism, bound, limits):
     slack = min(margin, 0.5 * limits.tolerance)
     slack_rotation = min(POSITION_ROUNDING, 0.5 * limits.tolerance_rotation)
     unreachable = bound > limits.tolerance
+    phases = 1 if unreachable else limits.phases
     return Criteria(
         bound + limits.tolerance - slack,
         limits.tolerance_rotation - slack_rotation,
         max(margin, FAR_MARGIN * limits.tolerance) if unreachable else margin,
         limits.far_iterations if unreachable else limits.max_iterations,
-        limits.phases > 1 and not unreachable and len(mechanism.effectors) > 1,
+        limits.restarts,
+        phases,
+        limits.restarts if phases == 1 else 0,
+        not unreachable and limits.restarts + phases > 1,
+        phases > 1 and len(mechanism.effectors) > 1,
     )
-
-
-def place_effectors(mechanism, data, positions, rotations):
-    """Put the effectors where a pose of all joints of the articulation puts them."""
-    for e in range(len(mechanism.effectors)):
-        j = mechanism.effectors["source"][e]
-        x, R = load_vector(positions, j), load_quaternion(rotations, j)
-        store_effector(mechanism, data, e, x, R)
 
 
 def perturb_mechanism(state, _target, _criteria, first):
     """Bend a mechanism stuck away from its target: all joints share an angle."""
     mechanism, q, angle = state.mechanism, state.data.q, BEND / max(len(state.mechanism.joints), 1)
-    joints, missed_target = mechanism.joints, first[COST] > POSITION_ROUNDING * mechanism.reach
-    if not (first[STATE] == STALLED and first[COUNT] < STUCK and missed_target):
+    joints, missed_target = mechanism.joints, first["merit"] > POSITION_ROUNDING * mechanism.reach
+    if not (first["ending"] == STALLED and first["iterations"] < STUCK and missed_target):
         return False
     for j in range(len(joints)):
         kind = joints["kind"][j] if joints["leader"][j] == j else FIXED
@@ -232,13 +245,14 @@ def perturb_mechanism(state, _target, _criteria, first):
             bend = rotation_about(PERTURBATION_AXIS, angle)
             store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), bend)))
             clamp_joint(joints, j, q)
-    forget(state.mixing)
-    update_forward_kinematics(mechanism, state.data)
+    place_mechanism(state)
     return True
 
 
 def place_mechanism(state):
-    """Bring the mechanism to its coordinates."""
+    """Bring the mechanism to its coordinates, and forget all iterations."""
+    state.far_step["square"][0] = 0.0
+    forget(state.mixing)
     update_forward_kinematics(state.mechanism, state.data)
 
 
@@ -254,9 +268,7 @@ def draw_mechanism(state, target, criteria, n):
         if n == 1:
             rank_restarts(state, target)
         take_nearest(state, state.data.q)
-    clear(state.data.far_step)
-    forget(state.mixing)
-    update_forward_kinematics(state.mechanism, state.data)
+    place_mechanism(state)
 
 
 def redraw_limbs(state, target, criteria, n):
@@ -318,28 +330,28 @@ def take_nearest(state, q):
     copy_row(state.restarts[nearest], q)
 
 
-depth = 0  # of the sweeps that a solver remembers
-operations = Operations(
-    ccd_update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism, only_phase
-)
-# The update of each solver, and what begins its phases.
-UPDATES = {
-    "ccd": (ccd_update, only_phase),
-    "fabrik": (fabrik_update, only_phase),
-    "levenberg_marquardt": (levenberg_marquardt_update, levenberg_marquardt_phase),
-    "damped_least_squares": (damped_least_squares_update, only_phase),
-    "jacobian_transpose": (jacobian_transpose_update, only_phase),
-    "anderson_ccd": (anderson_ccd_update, only_phase),
-}
-# The kernel that solves mechanisms by the update of each solver.
-ON_MECHANISMS = {
-    name: Kernel(
-        bind(
-            solve_mechanisms,
-            operations=operations._replace(update=update, begin=begin),
-            depth=DEPTH * (update is anderson_ccd_update),
-        ),
-        label=f"{name} for mechanisms",
-    )
-    for name, (update, begin) in UPDATES.items()
-}
+def shift_mechanism(state, n):
+    """Bring the mechanism from the start to further start n, within the limits.
+
+    Each hinge or slide with two limits goes to a share of its range, the same for every start. A
+    hinge without limits turns by this share of a circle, from the opposite of the start; all other
+    joints stay. The first further start is the middle.
+    """
+    joints, q = state.mechanism.joints, state.data.q
+    for j in range(len(joints)):
+        if joints["leader"][j] == j and joints["kind"][j] in (HINGE, SLIDE):
+            at, lower, upper = joints["coordinate"][j], joints["lower"][j], joints["upper"][j]
+            share = state.shares[n - 1, j]
+            if math.isfinite(upper - lower):
+                q[at] = lower + share * (upper - lower)
+            elif joints["kind"][j] == HINGE:
+                q[at] = min(max(q[at] + (share - 0.5) * FULL_CIRCLE, lower), upper)
+    place_mechanism(state)
+
+
+def on_mechanisms(update: Any) -> Operations:
+    """Return the operations of a solver with such an update."""
+    return Operations(
+        update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism,
+        shift_mechanism,
+    )  # fmt: skip

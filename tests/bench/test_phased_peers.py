@@ -1,16 +1,13 @@
 """The phases of Levenberg-Marquardt with a library's own task loop."""
 
-from types import SimpleNamespace
-
 import numpy as np
 import pinocchio as pin
 import pytest
 
-from plumbob.bench.peers.differential import LONG_WAY, PhasedReach, long_way, reaching
+from plumbob.bench.peers.differential import PhasedReach, further_starts, reaching
 from plumbob.bench.problems.evaluate import Tolerance, evaluator_of, pinocchio_model, to_pinocchio
 from plumbob.bench.problems.robot_targets import robot_targets
 from plumbob.bench.problems.robots import CHARACTER, UnableError, is_installed
-from plumbob.reference import rotation
 
 TOLERANCE = Tolerance(1e-3, 1e-3)
 needs_robots = pytest.mark.skipif(not is_installed("panda"), reason="example-robot-data is absent")
@@ -31,19 +28,6 @@ class FrameTask:
     def rows(self, configuration):
         e, J = self.compute_error(configuration), configuration.jacobian(self.frame)
         return [(J, e), (np.sqrt(self.lm_damping * e @ e) * np.eye(J.shape[1]), 0.0)]
-
-
-class PostureTask:
-    """The displacement from a posture, with a cost."""
-
-    def __init__(self, size):
-        self.cost = np.zeros(size)
-
-    def set_target(self, q):
-        self.q = q
-
-    def rows(self, configuration):
-        return [(np.diag(self.cost), self.cost * (self.q - configuration.q))]
 
 
 class Configuration:
@@ -81,17 +65,17 @@ def solve_ik(configuration, tasks, dt, **_):
 def test_phases_reach_what_one_does_not_within_the_same_iterations():
     robot, targets = evaluator_of("panda").robot, robot_targets("panda", 5)
     configuration, frame = Configuration(robot), FrameTask(robot.effectors[0])
-    posture, steps = PostureTask(len(robot.joints)), []
-    options = {"rotated": lambda target, R: target * pin.SE3(R, np.zeros(3))}
+    steps = []
 
     def counted(*arguments, **more):
         steps.append(arguments)
         return solve_ik(*arguments, **more)
 
     plain = reaching(counted, configuration, [frame], robot, TOLERANCE, 100)
-    phased = PhasedReach(
-        counted, configuration, (frame, posture), options["rotated"], (robot, TOLERANCE, 100, 8)
-    )
+    goal, starts = (robot, TOLERANCE, 100), further_starts(robot, 8)
+    assert starts.shape == (7, len(robot.joints))
+    assert ((robot.lower < starts) & (starts < robot.upper)).all()
+    phased = PhasedReach(counted, configuration, frame, goal, starts)
     reached = {plain: 0, phased: 0}
     for i in range(targets.shape[0]):
         request = targets.request(i)
@@ -109,15 +93,7 @@ def test_phases_reach_what_one_does_not_within_the_same_iterations():
     assert reached[phased] >= reached[plain] + 5
 
 
-def test_the_long_way_turns_about_the_opposite_axis(rng):
-    R, target = rotation.to_matrix(rotation.random(rng, 2))
-    error = rotation.logarithm(rotation.from_matrix(R.T @ target))
-    turned = rotation.logarithm(rotation.from_matrix(R.T @ target @ long_way(error)))
-    np.testing.assert_allclose(turned, -LONG_WAY * error / np.linalg.norm(error), atol=1e-9)
-
-
 def test_phases_are_refused_for_a_robot_of_several_effectors():
     robot = evaluator_of(CHARACTER).robot
-    tasks = (SimpleNamespace(), SimpleNamespace())
     with pytest.raises(UnableError):
-        PhasedReach(solve_ik, None, tasks, None, (robot, TOLERANCE, 100, 8))
+        PhasedReach(solve_ik, None, None, (robot, TOLERANCE, 100), [])

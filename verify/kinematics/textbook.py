@@ -9,7 +9,7 @@ import math
 from typing import Any, NamedTuple
 
 from plumbob.reference.arguments import FloatArray, IndexArray
-from plumbob.reference.backend.compiled import Kernel, bind
+from plumbob.reference.backend.compiled import Kernel
 from plumbob.reference.kinematics import forward_pose
 from plumbob.reference.quaternion import (
     IDENTITY,
@@ -32,6 +32,13 @@ from plumbob.reference.quaternion import (
 )
 
 UNCAPPED = 10.0  # an angle that no rotation has [rad]
+
+
+class Method(NamedTuple):
+    """The kernels of a solver: a sweep, and what makes rotations of positions."""
+
+    sweep: Any
+    finish: Any
 
 
 class Choices(NamedTuple):
@@ -73,7 +80,12 @@ def place(chain: TextbookChain, pose: TextbookPose) -> None:
 
 
 def solve(
-    chain: TextbookChain, target: Any, ending: Ending, choices: Choices, pose: TextbookPose
+    method: Method,
+    chain: TextbookChain,
+    target: Any,
+    ending: Ending,
+    choices: Choices,
+    pose: TextbookPose,
 ) -> int:
     """Solve in place, `pose` from the start to the result, and return the number of sweeps."""
     place(chain, pose)
@@ -180,16 +192,7 @@ def follow(chain: TextbookChain, pose: TextbookPose) -> None:
         store_vector(pose.positions, j, load_vector(points, j))
 
 
-class Method(NamedTuple):
-    """The kernels of a solver: a sweep, and what makes rotations of positions."""
-
-    sweep: Any
-    finish: Any
-
-
-method = Method(sweep_ccd, leave)
-FABRIK = Method(sweep_fabrik, follow)
 SOLVERS = {
-    "ccd": Kernel(solve, label="CCD of the textbook"),
-    "fabrik": Kernel(bind(solve, method=FABRIK), label="FABRIK of the textbook"),
+    "ccd": Kernel(solve, given=(Method(sweep_ccd, leave),), label="CCD of the textbook"),
+    "fabrik": Kernel(solve, given=(Method(sweep_fabrik, follow),), label="FABRIK of the textbook"),
 }

@@ -11,9 +11,9 @@ from typing import Any
 
 from ...problems.evaluate import evaluator_of, mujoco_model
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from ..differential import PhasedReach, meeting, reaching
+from ..differential import PhasedReach, further_starts, meeting, reaching
 from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
-from ..protocol import BenchRobot, FloatArray, PoseRequest, Solve, SolveFactory, Tolerance
+from ..protocol import BenchRobot, PoseRequest, Solve, SolveFactory, Tolerance
 
 # The search chose these on the tuning robots (docs/peers/mink.md).
 _SETTINGS = {"damping": 1e-12, "lm_damping": 0.001, "gain": 1.0, "limit_gain": 0.95}
@@ -62,9 +62,8 @@ def prepare(
     options: dict[str, Any] = {"damping": damping, "limits": limits}
     reach: Callable[..., bool] = reaching(mink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
-        parts = (*tasks, mink.PostureTask(configuration.model, 0.0))
-        phased = (parts, _rotated, (*goal, phases))
-        reach = PhasedReach(mink.solve_ik, configuration, *phased, **options)
+        starts = further_starts(robot, phases)
+        reach = PhasedReach(mink.solve_ik, configuration, tasks[0], goal, starts, **options)
 
     def make_solve(request: PoseRequest) -> Solve:
         targets = [
@@ -75,11 +74,6 @@ def prepare(
         return Solve(solve, lambda claim: (configuration.q.copy(), claim))
 
     return make_solve
-
-
-def _rotated(target: Any, R: FloatArray) -> Any:
-    rotation = type(target.rotation()).from_matrix(R)
-    return target @ type(target).from_rotation(rotation)
 
 
 def prepare_task(

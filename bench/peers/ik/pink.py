@@ -12,15 +12,12 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, to_pinocchio
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
-from ..differential import PhasedReach, meeting, reaching
+from ..differential import PhasedReach, further_starts, meeting, reaching
 from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
 from ..protocol import (
     BenchRobot,
-    FloatArray,
     PoseRequest,
     Solve,
     SolveFactory,
@@ -71,9 +68,8 @@ def prepare(
     options: dict[str, Any] = {"damping": damping, "limits": limits, "safety_break": False}
     reach: Callable[..., bool] = reaching(pink.solve_ik, configuration, tasks, *goal, **options)
     if phases > 1:
-        parts = (*tasks, pink.PostureTask(np.zeros(configuration.model.nv)))
-        phased = (parts, _rotated, (*goal, phases))
-        reach = PhasedReach(pink.solve_ik, configuration, *phased, **options)
+        starts = [to_pinocchio(robot, q) for q in further_starts(robot, phases)]
+        reach = PhasedReach(pink.solve_ik, configuration, tasks[0], goal, starts, **options)
 
     def make_solve(request: PoseRequest) -> Solve:
         targets = [pink.configuration.pin.SE3(R, x) for x, R in request.poses]
@@ -81,10 +77,6 @@ def prepare(
         return Solve(solve, lambda claim: (from_pinocchio(robot, configuration.q), claim))
 
     return make_solve
-
-
-def _rotated(target: Any, R: FloatArray) -> Any:
-    return target * type(target)(R, np.zeros(3))
 
 
 def prepare_task(

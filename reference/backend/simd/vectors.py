@@ -14,7 +14,7 @@ changed and stored whole. Three right-hand sides leave the fourth at zero.
 import numpy as np
 
 from ...quaternion import load_quaternion, load_vector, made_unit, store_quaternion, store_vector
-from ..compiled import PythonKernel, bind, compiled_in
+from ..compiled import PythonKernel, compiled_in, rebuilt
 
 # Doubles in a register of AVX-512, or two of AVX.
 LANES = 8
@@ -106,7 +106,7 @@ _ON_TILES = {
     "store_rotation": store_quaternions,
     "load_unit": load_lanes,
     "store_unit": store_lanes,
-    "made_unit": bind(made_unit, within=all_within),
+    "made_unit": rebuilt(made_unit, within=all_within),
 }
 
 
@@ -117,4 +117,4 @@ def in_lanes(kernel: PythonKernel) -> PythonKernel:
     scratch array, (joint, 4, LANES).
     """
     names = kernel.__code__.co_names
-    return bind(kernel, **{name: _ON_TILES[name] for name in names if name in _ON_TILES})
+    return rebuilt(kernel, **{name: _ON_TILES[name] for name in names if name in _ON_TILES})

@@ -17,6 +17,7 @@ from ...arguments import FloatArray, is_plain, shown
 from ...articulation import LIMIT_TOLERANCE, Articulation
 from ...model import Model, checked_model, effector_of
 from ..bounded_step import FULL_CIRCLE
+from ..mechanism import TARGET
 from ..problem import (
     CheckedTarget,
     Target,
@@ -200,12 +201,14 @@ def _by_search(
     (pose,) = check_numbers([pose])
     starts = arm.articulation.random(np.random.default_rng(seed), restarts)
     tolerances = tolerance * arm.mechanism.reach, tolerance
-    settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False)
+    settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False, 1)
     ends = solve_checked(arm.articulation, starts, [pose], settings)
     is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
     candidates = np.ascontiguousarray(ends.coordinates[is_near][:, arm.mechanism.columns])
     rows = np.empty((len(candidates), len(arm.columns) + FIGURES))
-    count, _ = settle_kernel(tuple(arm.mechanism), candidates, target_rows([pose], ()), rows)
+    count, _ = settle_kernel(
+        tuple(arm.mechanism), candidates, target_rows([pose], ()).view(TARGET)[None], rows
+    )
     rows = rows[:count]
     hits = rows[:, -1]
     single = int((hits == 1.0).sum())

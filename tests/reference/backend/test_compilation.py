@@ -23,7 +23,7 @@ def polynomial(x):
 
 def fresh(kernel):
     """A kernel of the same source that nobody has compiled in this process, and uncached."""
-    return compiled.bind(kernel, power=compiled.bind(power, range=range))
+    return compiled.rebuilt(kernel, power=compiled.rebuilt(power, range=range))
 
 
 @pytest.fixture(autouse=True)

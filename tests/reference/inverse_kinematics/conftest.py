@@ -14,6 +14,7 @@ from plumbob.reference import (
     rotation,
     set_backend,
 )
+from plumbob.reference.inverse_kinematics.far_step import FAR_STEP
 from plumbob.reference.inverse_kinematics.mechanism import (
     TARGET,
     gather,
@@ -95,6 +96,11 @@ class Machine(NamedTuple):
     target: np.ndarray
     data: Any
     workspace: Any
+
+    @property
+    def far_step(self) -> np.ndarray:
+        """Return the record of a step that has not been made."""
+        return np.zeros(1, FAR_STEP)
 
 
 def machine_of(model, q, targets):

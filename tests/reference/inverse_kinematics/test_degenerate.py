@@ -174,7 +174,7 @@ def test_what_only_rounding_keeps_from_its_target_is_stalled(rng):
     targets = forward_kinematics(model, model.random(rng, 300)).positions[:, -1]
     solution = solve_ik(model, model.random(rng), targets, "levenberg_marquardt", tolerance=4e-16)
     soon = solution.iterations < 100
-    assert soon.sum() > 200
+    assert soon.sum() > 150
     off = soon & (solution.residual > 4e-16)
     assert off.any()
     assert (solution.outcome[off] == Outcome.STALLED).all()

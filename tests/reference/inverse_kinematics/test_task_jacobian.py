@@ -20,10 +20,10 @@ from plumbob.reference.inverse_kinematics.bounded_step import (
     linearise_task,
     transposed_step,
 )
-from plumbob.reference.inverse_kinematics.jacobian import (
+from plumbob.reference.inverse_kinematics.jacobian import FIXED_DAMPING
+from plumbob.reference.inverse_kinematics.levenberg_marquardt import (
     DAMPING_OF_POSES,
     DAMPING_OF_POSITIONS,
-    FIXED_DAMPING,
 )
 from plumbob.reference.inverse_kinematics.mechanism import LEVER
 from plumbob.reference.jacobians import integrate, jacobian

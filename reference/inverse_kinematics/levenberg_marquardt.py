@@ -1,0 +1,63 @@
+"""Levenberg-Marquardt: steps by damped least squares whose damping follows the squared error.
+
+An iteration computes the errors e of the effectors and their Jacobian J. It solves
+(J J' + mu 1) z = e and changes the coordinates by J' z. The *damping* mu is a share of |e|² plus a
+bias (Sugihara 2011). Far from the target the step is short and safe; near the target convergence
+is quadratic even where the Jacobian loses rank. Every step is taken.
+
+- *End*: `restarts.py` calls the update until the target is within the tolerances, the error no
+  longer changes, or the iterations allowed are made.
+- *Limits*: `damped_step` of `bounded_step.py` stops freedoms at their limits and solves for the
+  others again.
+- *Beyond reach*: `step_towards` makes Newton's steps to the nearest pose (`far_step.py`).
+- *Stalls*, mostly at limits: `restarts.py` tries further starts.
+- *Compiled* are the two kernels at the end, with all that they call.
+
+A chain of unlimited balls with one position has a form of its own, see `jacobian.py`.
+"""
+
+from ..backend.compiled import Kernel
+from ..quaternion import dot
+from .bounded_step import linearise_task, take_step
+from .far_step import step_towards
+from .jacobian import linearise, rotate_joints, solve_damped
+from .linear_algebra import ROUNDING_DAMPING, inner
+from .solve_chain import on_chains, solve_chains
+from .solve_mechanism import on_mechanisms, solve_mechanisms
+
+# Damping over the squared error, for positions; and for rotations as well, the factor of Chan &
+# Lawrence 1988, which needs fewer iterations there.
+DAMPING_OF_POSITIONS, DAMPING_OF_POSES = 0.5, 0.1
+# Over the reach squared; only to keep a division by zero away.
+BIAS = 1e-24
+
+
+def levenberg_marquardt_sweep(chain, target):
+    """Rotate all joints by J^T (J J^T + mu 1)^-1 e, mu = 1/2 |e|^2 + bias."""
+    e, A = linearise(chain, target, 0.0)
+    damping = DAMPING_OF_POSITIONS * dot(e, e) + BIAS * chain.reach * chain.reach
+    damping += ROUNDING_DAMPING * (A[0] + A[1] + A[2])
+    rotate_joints(chain, solve_damped(A, damping, e))
+
+
+def levenberg_marquardt_update(state, target):
+    """Change the coordinates by J' (J J' + mu 1)^-1 e, within their limits."""
+    mechanism, data, system = state.mechanism, state.data, state.workspace.system
+    linearise_task(mechanism, target, data, system)
+    positions = 3 * len(mechanism.effectors) == mechanism.equations
+    share = DAMPING_OF_POSITIONS if positions else DAMPING_OF_POSES
+    damping = share * inner(system.e, system.e) + BIAS * mechanism.reach * mechanism.reach
+    step_towards(state, target, damping)
+    take_step(mechanism, data, system)
+
+
+ON_CHAINS = Kernel(
+    solve_chains,
+    given=(on_chains(levenberg_marquardt_sweep), 0),
+    label="levenberg_marquardt, chains",
+)
+ON_MECHANISMS = Kernel(
+    solve_mechanisms,
+    given=(on_mechanisms(levenberg_marquardt_update), 0),
+    label="levenberg_marquardt, mechanisms",
+)
