@@ -334,8 +334,8 @@ def shift_mechanism(state, n):
     """Bring the mechanism from the start to further start n, within the limits.
 
     Each hinge or slide with two limits goes to a share of its range, the same for every start. A
-    hinge without limits turns by this share of a circle, from the opposite of the start; all other
-    joints stay. The first further start is the middle.
+    hinge without limits turns by this share of a circle; all other joints stay. The first further
+    start is the middle.
     """
     joints, q = state.mechanism.joints, state.data.q
     for j in range(len(joints)):
@@ -345,7 +345,7 @@ def shift_mechanism(state, n):
             if math.isfinite(upper - lower):
                 q[at] = lower + share * (upper - lower)
             elif joints["kind"][j] == HINGE:
-                q[at] = min(max(q[at] + (share - 0.5) * FULL_CIRCLE, lower), upper)
+                q[at] = min(max(q[at] + share * FULL_CIRCLE, lower), upper)
     place_mechanism(state)
 
 

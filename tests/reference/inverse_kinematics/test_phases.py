@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from plumbob.reference import (
+    Articulation,
     Outcome,
     Target,
     forward_kinematics,
@@ -13,6 +14,7 @@ from plumbob.reference import (
     solve_ik,
     track,
 )
+from plumbob.reference.inverse_kinematics.reduce import FURTHER_STARTS, further_shares
 from plumbob.reference.inverse_kinematics.restarts import PATIENCE_OF_PHASES
 
 COUNT = 150
@@ -122,3 +124,48 @@ def test_only_levenberg_marquardt_has_phases_and_a_track_has_none(arm, task):
 
 
 # ---- what the phases are made of
+
+
+@pytest.mark.parametrize("joints", [1, 2, 7, 30])
+def test_further_starts_fill_the_middle_of_the_ranges_evenly(joints):
+    shares = further_shares(joints)
+    assert shares.shape == (FURTHER_STARTS, joints)
+    assert (shares[0] == 0.5).all()
+    assert ((shares >= 0.25) & (shares <= 0.75)).all()
+    for column in shares.T:  # along no axis two are alike
+        assert np.diff(np.sort(column)).min() > 1e-3
+
+
+def test_the_second_phase_begins_in_the_middle_of_the_ranges(arm, task):
+    """A target there is reached without another iteration, once the first phase is given up."""
+    middle = 0.5 * (arm.lower + arm.upper)
+    pose = forward_kinematics(arm, middle)
+    target = Target(pose.positions[-1], pose.rotations[-1])
+    start, _ = task
+    solution = solve_ik(arm, start, target, "levenberg_marquardt", phases=2)
+    given_up = (solution.coordinates == middle).all(axis=-1)
+    assert np.count_nonzero(given_up) > COUNT // 10
+    assert (solution.outcome[given_up] == Outcome.CONVERGED).all()
+    assert (solution.iterations[given_up] >= PATIENCE_OF_PHASES).all()
+
+
+def test_hinges_without_limits_turn_by_shares_of_a_circle(arm, rng):
+    """The second phase begins half a circle from the start."""
+    free = Articulation(arm.skeleton, "hinge", arm.axes)
+    starts = free.random(rng, COUNT)
+    pose = forward_kinematics(free, starts + np.pi)
+    target = Target(pose.positions[:, -1], pose.rotations[:, -1])
+    solution = solve_ik(free, starts, target, "levenberg_marquardt", phases=2)
+    there = np.abs(solution.positions - pose.positions).max(axis=(1, 2)) < 1e-12
+    assert np.count_nonzero(there) > COUNT // 10
+    assert (solution.iterations[there] >= PATIENCE_OF_PHASES).all()
+
+
+def test_phases_are_the_same_whatever_the_number_of_restarts(arm, task):
+    """With restarts that all fail, of no iterations, the phases give the answer of one start."""
+    start, target = task
+    alone = solve_ik(arm, start, target, "levenberg_marquardt", max_iterations=60)
+    more = solve_ik(arm, start, target, "levenberg_marquardt", max_iterations=60, restarts=4)
+    reached = alone.outcome == Outcome.CONVERGED
+    assert (more.outcome[reached] == Outcome.CONVERGED).all()
+    assert (more.merit <= alone.merit + 1e-12)[~reached].all()
