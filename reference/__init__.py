@@ -19,7 +19,7 @@ from .inverse_kinematics import (
 )
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
 from .inverse_kinematics.prepared import PreparedIK, prepare_ik
-from .inverse_kinematics.solve_tasks import TaskSolution, solve_tasks
+from .inverse_kinematics.solve_tasks import PreparedTasks, TaskSolution, prepare_tasks, solve_tasks
 from .judging import PoseJudgement, StepJudgement, judge_pose, judge_step
 from .kinematics import PreparedKinematics, forward_kinematics, local_from_global, prepare
 from .mass_spring import MassSpring, State
@@ -45,6 +45,7 @@ __all__ = [
     "PoseJudgement",
     "PreparedIK",
     "PreparedKinematics",
+    "PreparedTasks",
     "Skeleton",
     "State",
     "StepJudgement",
@@ -60,6 +61,7 @@ __all__ = [
     "local_from_global",
     "prepare",
     "prepare_ik",
+    "prepare_tasks",
     "resample",
     "rotation",
     "runge_kutta",

@@ -15,14 +15,14 @@ from plumbob import IK_SOLVERS, STEP_SOLVERS, Target, formats, rotation
 # Public by name, but no user's arguments come to them: they are made only by us, or take what is
 # checked already.
 _INTERNAL = """
-    Certificate IKCertificate PoseJudgement PreparedIK PreparedKinematics StepJudgement StepResult
+    Certificate IKCertificate PoseJudgement PreparedIK PreparedKinematics PreparedTasks
+    StepJudgement StepResult
     Articulation.checked Certificate.shares_minimiser_within MassSpring.replaced State.of
     Skeleton.path_array formats.bvh.euler_angles mass_spring.checked_state
     mass_spring.constant_forces mass_spring.pin_targets rotation.check_unit rotation.roll_pitch_yaw
-    tasks.CentreOfMass.evaluate tasks.Configuration.frame tasks.Coupling.evaluate
-    tasks.FrameTask.evaluate tasks.IKTask tasks.IKTask.evaluate tasks.LookAt.evaluate
-    tasks.Posture.evaluate tasks.configuration tasks.cross_matrix tasks.inverse_right_jacobian
-    tasks.matrix_of"""
+    tasks.BuiltInTask.evaluate tasks.BuiltInTask.factors tasks.CentreOfMass.factors
+    tasks.Configuration.frame tasks.Coupling.factors tasks.FrameTask.factors tasks.IKTask
+    tasks.IKTask.evaluate tasks.LookAt.factors tasks.Posture.factors tasks.configuration"""
 INTERNAL = _INTERNAL.split()
 RNG = functools.partial(np.random.default_rng, 9)
 OFFSETS, KINDS = (
@@ -100,6 +100,13 @@ def solved(task):
     return plumbob.solve_tasks(robot(), robot().neutral(), [task], max_iterations=8)
 
 
+def retargeted(task, target=None, rotation=None):
+    pose = plumbob.tasks.FrameTask("f", np.ones(3), (1.0, 0.0, 0.0, 0.0))
+    solve = plumbob.prepare_tasks(robot(), [pose], max_iterations=8)
+    solve.set_target(task, target, rotation)
+    return solve(robot().neutral()), solve.coordinates
+
+
 def within(setting):
     with setting:
         return 1.0
@@ -148,6 +155,8 @@ VARIANTS = {
         list(plumbob.all_solutions(arm(6), Target(position, rotation)).with_turns()),
     "prepare, called": lambda q: plumbob.prepare(robot())(q),
     "prepare_ik, called": lambda q, target: plumbob.prepare_ik(robot(), effector="f")(q, target),
+    "prepare_tasks, called": lambda q, tasks: plumbob.prepare_tasks(robot(), tasks)(q),
+    "PreparedTasks.set_target": retargeted,
     "formats.bvh.Motion.pose": lambda local_rotations, offsets:
         formats.bvh.Motion(tree(), local_rotations, 0.02, offsets).pose(),
 }  # fmt: skip
@@ -212,13 +221,13 @@ def values():
             "tolerance_rotation": 1e-4, "max_iterations": 8, "restarts": 1, "seed": 3,
             "record": True, "phases": 1, "prefer": None, "oriented": False, "target": point,
             "solver": "levenberg_marquardt", "position": point, "rotation": quaternions[0],
-            "weight": 2.0, "tasks": [Target(point, effector=5)], "curve": forces, "start": local[0],
-            "warm": True, "closed": False, "pose": local[0], "count": 12,
-            "min_spacing": 0.01, "max_spacing": 0.05, "masses": masses, "springs": SPRINGS,
-            **per_spring, "pinned": np.array([0]), "gravity": gravity, "positions": positions,
-            "velocities": velocities, "system": system, "state": state, "h": 0.01,
-            "external_forces": forces, "pin_positions": positions[:1] + 0.1, "result": result,
-            "other": proof, "distance": 0.1, "triangles": np.array([[0, 1, 2], [0, 2, 3]]),
+            "weight": 2.0, "tasks": [Target(point, effector=5)], "task": 0,
+            "curve": forces, "start": local[0], "warm": True, "closed": False, "pose": local[0],
+            "count": 12, "min_spacing": 0.01, "max_spacing": 0.05, "masses": masses,
+            "springs": SPRINGS, **per_spring, "pinned": np.array([0]), "gravity": gravity,
+            "positions": positions, "velocities": velocities, "system": system, "state": state,
+            "h": 0.01, "external_forces": forces, "pin_positions": positions[:1] + 0.1,
+            "result": result, "other": proof, "distance": 0.1, "triangles": np.array([[0, 1, 2], [0, 2, 3]]),
             "density": 1.2, "text": triangle,
         },
         "instances": {"Articulation": model, "Skeleton": balls, "ImplicitEuler": euler,
@@ -236,6 +245,7 @@ def values():
         "solve_ik, robot": {**of_robot, "prefer": "nearest"},
         "jacobians.jacobian, balls": {"articulation": balls, "q": local},
         "solve_tasks": {"q": q[0]}, "prepare": {"q": q[0]}, "prepare_ik": {"q": q[0]},
+        "prepare_tasks": {"q": q[0]},
         "all_solutions": {"robot": arm(7), "target": target, "grid": {2: 0.2}, "effector": 6},
         "ImplicitEuler": {"solver": "newton", "start": None},
         "tasks": {"frame": "f", "relative_to": "b", "target_frame": "b", "point": point,

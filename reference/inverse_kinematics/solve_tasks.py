@@ -1,12 +1,9 @@
-"""Levenberg-Marquardt on tasks: exact tasks are met, the others approached as far as possible.
+"""Tasks of a model, solved once, or prepared for many starts and targets."""
 
-An augmented Lagrangian (Rockafellar 1973) holds the exact tasks: multipliers u shift their
-residuals r. Where the minimum of the sum of squares of r + u and of the other residuals does not
-meet the exact tasks, u grows by r. The damping follows the gain (Nielsen 1999).
-"""
-
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+import threading
+from collections.abc import Sequence
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,36 +14,35 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import Model, checked_model, effector_of
 from ..outcome import Outcome
-from .bounded_step import TaskSystem, damped_step, new_system, take_step
-from .mechanism import (
-    EFFECTOR,
-    ConfigurationData,
-    Mechanism,
-    new_data,
+from ..rotation import unit
+from .descent import (
+    DescentOperations,
+    DescentState,
+    attempt,
+    attempt_from,
+    keep,
+    new_state,
+    place,
+    step,
 )
 from .problem import RESTARTS, Target
-from .tasks import Configuration, FrameTask, IKTask, configuration
+from .solve import OUTCOMES
+from .task_errors import (
+    CENTRE_OF_MASS,
+    FRAME,
+    LOOK_AT,
+    OWN,
+    POSTURE,
+    Evaluation,
+    evaluation_kernel,
+    task_arrays,
+)
+from .tasks import BuiltInTask, Configuration, FrameTask, IKTask, configuration
 
 # The default, twice that of `solve_ik`: exact tasks take several descents.
 MAX_ITERATIONS = 200
-# The first damping and the largest, over the largest diagonal entry of J J' at first.
-FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
-# An attempt settles where a step promises to lower the cost by less than the first share, or the
-# second between two updates of the multipliers. The second share halves the iterations, and costs
-# are half a per cent higher at most.
-SETTLED, SETTLED_BETWEEN = 1e-8, 1e-3
-# At a minimum a step at the first damping promises to lower the cost by no more than the first
-# share. Where a descent with exact tasks has settled, the second share counts: ten times the
-# remainder of nine in ten descents. In this step errors of exact tasks count HELD times as much.
-MINIMUM, MINIMUM_BETWEEN, HELD = 1e-6, 1e-2, 1e4
-# A step counts if the cost falls by this share of what was promised.
-ACCEPTED = 1e-3
-# If an update of the multipliers leaves more than PROGRESS of the error, exact tasks count PENALTY
-# times as much, at most PENALTIES times.
-PROGRESS, PENALTY, PENALTIES = 0.1, 10.0, 6
-# Factors of exact residuals while the others are approached. Without a factor the others may lead
-# away for good, with a large one to dearer minima. The second is tried if the first lowers no cost.
-STRENGTHS = 1.0, 30.0
+# The target of each kind of task.
+TARGETS = {FRAME: "position", LOOK_AT: "target", CENTRE_OF_MASS: "position", POSTURE: "coordinates"}
 
 
 class TaskSolution(NamedTuple):
@@ -69,13 +65,145 @@ class TaskSolution(NamedTuple):
     outcome: Outcome
 
 
-class _Evaluation(NamedTuple):
-    """A configuration with weighted residuals of all tasks."""
+class PreparedTasks(threading.local):
+    """The tasks of a model for many starts and targets, solved into the same arrays every time.
 
-    q: FloatArray
-    r: FloatArray  # (row,)
-    J: FloatArray  # (row, freedom)
-    errors: FloatArray  # the largest entry of each task's residual, (task,)
+    Each thread that shares the object has arrays and targets of its own, as `prepare_tasks` made
+    them, and so has a copy.
+
+    Attributes:
+        coordinates: of the last solution, a read-only view of an array that the next call fills,
+            NaN before the first call, (coordinate,).
+        errors: likewise, the largest entry of each task's residual [m or rad], (task,).
+        cost: the sum of weight |residual|² of the tasks not exact.
+        iterations: of all attempts.
+    """
+
+    def __init__(
+        self, model: Articulation, tasks: tuple[IKTask, ...], settings: tuple[Any, ...]
+    ) -> None:
+        """Allocate the arrays of a thread; `prepare_tasks` checks the arguments."""
+        self._problem = model, tasks, settings
+        kinds = [task.kind if isinstance(task, BuiltInTask) else OWN for task in tasks]
+        factors = [_factors(model, task) for task in tasks]
+        self._state = state = new_state(model, task_arrays(model, tasks, kinds, factors))
+        arrays = tuple(tuple(part) if isinstance(part, tuple) else part for part in state)
+        self._solve = partial(_attempt.in_force, arrays)
+        if OWN in kinds:
+            operations = DescentOperations(self._evaluate, _step.in_force, _keep.in_force)
+            self._solve = partial(_attempt_own, operations, state)
+        self._rng, self._drawn = np.random.default_rng(settings[-1]), list[FloatArray]()
+        self._q, self._errors = np.full_like(state.best.q, np.nan), np.full(len(kinds), np.nan)
+        self.coordinates, self.errors = frozen(self._q), frozen(self._errors)
+        self.cost, self.iterations = np.nan, 0
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes a copy, which has arrays of its own."""
+        return type(self), self._problem
+
+    def __call__(self, q: ArrayLike) -> Outcome:
+        """Solve from a start, (coordinate,), brought within the limits; return the outcome.
+
+        Raises:
+            ValueError: if the start is not valid. The solution is then not defined.
+        """
+        row, best = arguments.floats("q", q, len(self._q)), self._state.best
+        model, _, (tolerance, limit, restarts, _) = self._problem
+        total, least, result = 0, np.inf, 0
+        for k in range(restarts + 1):
+            count, outcome, error, cost = self._solve(row, tolerance, limit)
+            if count < 0:  # raise, or the lengths were within rounding of the tolerance
+                row = model.checked("q", row)
+                count, outcome, error, cost = self._solve(row, tolerance, limit)
+            total += count
+            if error < least:
+                least, result, self.cost = error, outcome, cost
+                self._q[:], self._errors[:] = best.q, best.errors
+            if least <= tolerance or k == restarts:
+                break
+            row = self._restart(k)
+        self.iterations = total
+        return OUTCOMES[result]
+
+    def set_target(
+        self, task: int, target: ArrayLike | None = None, rotation: ArrayLike | None = None
+    ) -> None:
+        """Give a task another target.
+
+        Args:
+            task: its index in the list.
+            target: the position of a FrameTask or CentreOfMass [m], (3,); the point that LookAt
+                looks at [m], (3,); the coordinates of a Posture; None to keep it.
+            rotation: of a FrameTask, unit quaternion (4,); None to keep it.
+
+        Raises:
+            ValueError: if an argument is not valid, or the task has no such target.
+        """
+        arrays, records = self._state.tasks, self._state.tasks.records
+        t = arguments.integer("task", task, minimum=0, below=len(records))
+        if target is not None:
+            name = TARGETS.get(int(records["kind"][t]))
+            if name is None or (name == "position" and not records["has_position"][t]):
+                raise ValueError(f"target: expected None for task {t}, got {shown(target)}")
+            if name == "coordinates":
+                target = arguments.floats("target", target, len(self._q))
+                arrays.coordinates[t] = self._problem[0].checked("target", target)
+            else:
+                records[name][t] = arguments.coordinates("target", target, 3)
+        if rotation is not None:
+            if not records["has_rotation"][t]:
+                raise ValueError(f"rotation: expected None for task {t}, got {shown(rotation)}")
+            records["rotation"][t] = unit("rotation", arguments.floats("rotation", rotation, 4))
+
+    def _restart(self, k: int) -> FloatArray:
+        """Return the random configuration of a restart; all calls have the same."""
+        if k == len(self._drawn):
+            self._drawn.append(self._problem[0].random(self._rng))
+        return self._drawn[k]
+
+    def _evaluate(self, state: DescentState, evaluation: Evaluation) -> None:
+        """Evaluate all tasks at the data, those of the user in Python."""
+        evaluation_kernel(state, evaluation)
+        model, tasks, _ = self._problem
+        current = configuration(model, evaluation.q.copy())
+        for t, (task, record) in enumerate(zip(tasks, state.tasks.records, strict=True)):
+            if record["kind"] == OWN:
+                rows = slice(record["row"], record["row"] + record["size"])
+                r, J = _evaluated(task, current, int(record["size"]))
+                root = record["weight"] ** 0.5
+                evaluation.r[rows], evaluation.J[:, rows] = root * r, root * J.T
+                evaluation.errors[t] = np.abs(r).max(initial=0.0)
+
+
+def prepare_tasks(
+    model: Model,
+    tasks: Sequence[IKTask | Target],
+    *,
+    tolerance: float = 1e-4,
+    max_iterations: int = MAX_ITERATIONS,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+) -> PreparedTasks:
+    """Return `solve_tasks` for many starts and targets: `prepare_tasks(model, tasks)(q)`.
+
+    Arguments are as in `solve_tasks`. The kernel is of the backend now in force.
+
+    Raises:
+        ValueError: if an argument is not valid, or the joint of a task does not exist.
+    """
+    articulation = checked_model(model, "model")
+    if not isinstance(articulation, Articulation):
+        raise ValueError("model: expected an Articulation or a Robot, got a Skeleton")
+    settings = (
+        arguments.number("tolerance", tolerance, minimum=0.0),
+        arguments.count("max_iterations", max_iterations, minimum=0),
+        arguments.count("restarts", restarts, minimum=0),
+        arguments.integer("seed", seed, minimum=0),
+    )
+    if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
+        raise ValueError(f"tasks: expected a list of at least one task, got {shown(tasks)}")
+    parts = tuple(_as_task(articulation, task) for task in tasks)
+    return PreparedTasks(articulation, parts, settings)
 
 
 def solve_tasks(
@@ -103,175 +231,12 @@ def solve_tasks(
     Raises:
         ValueError: if an argument is not valid, or the joint of a task does not exist.
     """
-    articulation = checked_model(model, "model")
-    if not isinstance(articulation, Articulation):
-        raise ValueError("model: expected an Articulation or a Robot, got a Skeleton")
-    start = arguments.floats("q", q, articulation.coordinate_count)
-    start = articulation.clamp(articulation.checked("q", start))
-    problem = TaskProblem(articulation, start, tasks)
-    tolerance = arguments.number("tolerance", tolerance, minimum=0.0)
-    limit = arguments.count("max_iterations", max_iterations, minimum=0)
-    restarts = arguments.count("restarts", restarts, minimum=0)
-    rng = np.random.default_rng(arguments.integer("seed", seed, minimum=0))
-    best, total = None, 0
-    for row in _starts(articulation, start, restarts, rng):
-        solution = _attempt(problem, row, tolerance, limit)
-        total += solution.iterations
-        if best is None or problem.misses(solution) < problem.misses(best):
-            best = solution
-        if problem.misses(best) <= tolerance:
-            break
-    assert best is not None, "the start is the first attempt"
-    return best._replace(iterations=total)
-
-
-def _starts(
-    model: Articulation, q: FloatArray, restarts: int, rng: np.random.Generator
-) -> Iterator[FloatArray]:
-    yield q
-    for _ in range(restarts):
-        yield model.random(rng)
-
-
-class TaskProblem:
-    """The tasks of a model, and the arrays of its kernels."""
-
-    def __init__(
-        self, model: Articulation, q: FloatArray, tasks: Sequence[IKTask | Target]
-    ) -> None:
-        if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
-            raise ValueError(f"tasks: expected a list of at least one task, got {shown(tasks)}")
-        self.model, self.tasks = model, [_as_task(model, task) for task in tasks]
-        n, freedoms = model.joint_count, model.freedom_count
-        self.mechanism = Mechanism(
-            model.joints, np.arange(model.coordinate_count), np.zeros(0, EFFECTOR),
-            np.zeros((n, 0), dtype=bool), np.zeros((n, n), dtype=bool), 1.0, freedoms, 0,
-        )  # fmt: skip
-        self.data: ConfigurationData = new_data(self.mechanism)
-        start = configuration(model, q)
-        sizes = [len(_evaluated(task, start, "row")[0]) for task in self.tasks]
-        self.system: TaskSystem = new_system(sum(sizes), freedoms)
-        self.exact = np.repeat([task.exact for task in self.tasks], sizes)
-        self.root = np.sqrt(np.repeat([task.weight for task in self.tasks], sizes))
-        self.is_exact = np.array([task.exact for task in self.tasks])
-        self.sizes = sizes
-
-    def at(self, q: FloatArray) -> _Evaluation:
-        """Return the weighted residuals at q."""
-        current = configuration(self.model, q)
-        pairs = zip(self.tasks, self.sizes, strict=True)
-        parts = [_evaluated(task, current, size) for task, size in pairs]
-        residuals, derivatives = zip(*parts, strict=True)
-        errors = np.array([np.abs(residual).max(initial=0.0) for residual in residuals])
-        r, J = np.concatenate(residuals), np.concatenate(derivatives)
-        return _Evaluation(q, self.root * r, self.root[:, None] * J, errors)
-
-    def step(
-        self, state: _Evaluation, e: FloatArray, scale: FloatArray, damping: float
-    ) -> tuple[FloatArray, float]:
-        """Return coordinates after a damped step within the limits, and the promised decrease."""
-        system, data = self.system, self.data
-        system.e[:], system.J[:], data.q[:] = e, (scale[:, None] * state.J).T, state.q
-        _step(self.mechanism, data, system, damping)
-        left = e - scale * (state.J @ system.step)
-        _move(self.mechanism, data, system)
-        return data.q.copy(), float(e @ e - left @ left)
-
-    def is_met(self, state: _Evaluation, tolerance: float) -> bool:
-        """Return whether every exact task is met."""
-        return bool((state.errors[self.is_exact] <= tolerance).all())
-
-    def cost(self, state: _Evaluation) -> float:
-        """Return the weighted sum of squares of the tasks not exact."""
-        return float(np.sum(state.r[~self.exact] ** 2))
-
-    def is_minimum(self, state: _Evaluation, tolerance: float, share: float) -> bool:
-        """Return whether motions within limits and exact tasks lower the cost at most by `share`.
-
-        `share` is relative to the cost. Met tasks have nothing left to lower.
-        """
-        if (state.errors[~self.is_exact] <= tolerance).all():
-            return True
-        unit, unit_exact = (_unit(state.J[rows]) for rows in (~self.exact, self.exact))
-        scale = np.where(self.exact, HELD * (unit / unit_exact) ** 0.5, 1.0)
-        e = np.where(self.exact, 0.0, -state.r)
-        _, promised = self.step(state, e, scale, FIRST_DAMPING * unit)
-        return promised <= share * self.cost(state)
-
-    def misses(self, solution: TaskSolution) -> float:
-        """Return the largest error of an exact task."""
-        return float(solution.errors[self.is_exact].max(initial=0.0))
-
-
-def _attempt(problem: TaskProblem, q: FloatArray, tolerance: float, limit: int) -> TaskSolution:
-    """Return the solution from a start: first the exact tasks, then all tasks together.
-
-    If these end away from the exact tasks, the exact tasks are met again from there.
-    """
-    exact = problem.exact.astype(float)
-    state, count, stalled = _descend(problem, q, exact, tolerance, limit)
-    others_follow = problem.is_met(state, tolerance) and not problem.exact.all()
-    for strength in STRENGTHS if others_follow else ():
-        scale = np.where(problem.exact, strength, 1.0)
-        end, more, stalled = _descend(problem, state.q, scale, tolerance, limit - count)
-        count += more
-        if not problem.is_met(end, tolerance):
-            end, more, stalled = _descend(problem, end.q, exact, tolerance, limit - count)
-            count += more
-        if problem.is_met(end, tolerance) and problem.cost(end) < problem.cost(state):
-            state = end
-            break
-    share = MINIMUM_BETWEEN if stalled and problem.exact.any() else MINIMUM
-    outcome = Outcome.STALLED if stalled else Outcome.ITERATION_LIMIT
-    if problem.is_met(state, tolerance) and problem.is_minimum(state, tolerance, share):
-        outcome = Outcome.CONVERGED
-    q, errors = frozen(state.q), frozen(state.errors)
-    return TaskSolution(q, errors, problem.cost(state), count, outcome)
-
-
-def _descend(
-    problem: TaskProblem, q: FloatArray, scale: FloatArray, tolerance: float, limit: int
-) -> tuple[_Evaluation, int, bool]:
-    """Minimise the scaled residuals from q; if other tasks exist, hold the exact tasks.
-
-    Returns:
-        The end; the iterations; and whether it has settled.
-    """
-    state, scale, shift = problem.at(q), scale.copy(), np.zeros(len(scale))
-    exact, missed, penalties = problem.exact, np.inf, 0
-    is_single = not scale[~exact].any()
-    settled = SETTLED if is_single or not exact.any() else SETTLED_BETWEEN
-    unit = _unit(state.J)
-    damping, growth = FIRST_DAMPING * unit, 2.0
-    for count in range(limit):
-        if is_single and problem.is_met(state, tolerance):
-            return state, count, True
-        e = -scale * (state.r + shift)
-        moved, promised = problem.step(state, e, scale, damping)
-        square, new = float(e @ e), problem.at(moved)
-        gain = square - float(np.sum((scale * (new.r + shift)) ** 2))
-        ratio = gain / promised if promised > 0.0 else 0.0
-        if ratio > ACCEPTED:
-            damping *= max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3)
-            growth, state = 2.0, new
-        else:
-            damping, growth = damping * growth, 2.0 * growth
-        if promised > settled * square and damping < LARGEST_DAMPING * unit:
-            continue
-        if is_single or problem.is_met(state, tolerance) or penalties == PENALTIES:
-            return state, count + 1, True
-        before, missed = missed, float(np.linalg.norm(state.r[exact]))
-        shift[exact] += state.r[exact]
-        if missed > PROGRESS * before:
-            scale[exact] *= PENALTY**0.5
-            shift /= PENALTY
-            penalties += 1
-    return state, limit, False
-
-
-def _unit(J: FloatArray) -> float:
-    """Return the largest diagonal entry of J J', 1 if nothing moves the residuals."""
-    return float(np.sum(J**2, axis=1).max(initial=0.0)) or 1.0
+    solve = prepare_tasks(
+        model, tasks, tolerance=tolerance, max_iterations=max_iterations, restarts=restarts,
+        seed=seed,
+    )  # fmt: skip
+    outcome = solve(q)
+    return TaskSolution(solve.coordinates, solve.errors, solve.cost, solve.iterations, outcome)
 
 
 def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
@@ -286,6 +251,14 @@ def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
     return task
 
 
+def _factors(model: Articulation, task: IKTask) -> FloatArray:
+    """Return the factors of the residual; a task of a user is evaluated once for its size."""
+    if isinstance(task, BuiltInTask):
+        return task.factors(model)
+    residual, _ = _evaluated(task, configuration(model, model.neutral()), "row")
+    return np.ones(len(residual))
+
+
 def _evaluated(
     task: IKTask, current: Configuration, size: int | str
 ) -> tuple[FloatArray, FloatArray]:
@@ -297,5 +270,18 @@ def _evaluated(
     return r, arguments.array("derivative", parts[1], len(r), current.model.freedom_count)
 
 
-_step = Kernel(damped_step, label="solve_tasks, step")
-_move = Kernel(take_step, label="solve_tasks, move")
+def _attempt_own(
+    operations: DescentOperations, state: DescentState, q: FloatArray, tolerance: float, limit: int
+) -> tuple[int, int, float, float]:
+    """Attempt from coordinates with tasks of a user, in the interpreter."""
+    if not _place(state, q):
+        return -1, 0, 0.0, 0.0
+    with np.errstate(all="ignore"):
+        solution: tuple[int, int, float, float] = attempt(operations, state, tolerance, limit)
+        return solution
+
+
+_attempt = Kernel(attempt_from, label="solve_tasks")
+_step = Kernel(step, label="solve_tasks, step")
+_place = Kernel(place, label="solve_tasks, start")
+_keep = Kernel(keep, label="solve_tasks, copy")

@@ -6,9 +6,10 @@ tasks are met; the others, such as a posture, are approached as far as exact tas
 radians. Frames are joints of the model, by index or name; None is the world.
 """
 
+from abc import abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, ClassVar, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,15 +17,21 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, KeepsReadOnly, frozen
 from ..articulation import Articulation
-from ..jacobians import difference, jacobians
-from ..quaternion import IDENTITY, conjugate, logarithm, multiply, rotate
+from ..jacobians import jacobians
+from .descent import new_state
+from .task_errors import (
+    CENTRE_OF_MASS,
+    COUPLING,
+    FRAME,
+    LOOK_AT,
+    POSTURE,
+    evaluation_kernel,
+    task_arrays,
+)
 
 # What a task takes as an ArrayLike, and holds as a read-only array.
 Values: TypeAlias = Any
 ORIGIN = (0.0, 0.0, 0.0)
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-# Below this angle [rad] the series of the right Jacobian's last factor is exact to rounding.
-SMALL_ANGLE = 1e-4
 
 
 class FramePoint(NamedTuple):
@@ -32,7 +39,6 @@ class FramePoint(NamedTuple):
 
     position: FloatArray  # in the world [m], (3,)
     matrix: FloatArray  # the frame's rotation in the world, (3, 3)
-    quaternion: tuple[float, float, float, float]  # the same, w first
     linear: FloatArray  # the derivative of the position, (3, freedom)
     angular: FloatArray  # the angular velocity in the world, (3, freedom)
 
@@ -48,16 +54,14 @@ class Configuration(NamedTuple):
 
     def frame(self, joint: int | str | None, point: ArrayLike = ORIGIN) -> FramePoint:
         """Return a point of a joint's frame, or of the world."""
+        x = np.asarray(point, dtype=float)
         if joint is None:
             still = np.zeros((3, self.model.freedom_count))
-            x = np.asarray(point, dtype=float)
-            return FramePoint(x, np.eye(3), IDENTITY, still, still)
+            return FramePoint(x, np.eye(3), still, still)
         j = self.model.index(joint, "frame")
-        Q, J = tuple(self.rotations[j].tolist()), self.jacobians[j]
-        R = matrix_of(Q)
-        arm = R @ np.asarray(point, dtype=float)
-        linear = J[:3] - cross_matrix(arm) @ J[3:]
-        return FramePoint(self.positions[j] + arm, R, Q, linear, J[3:])
+        R, J = rotation.to_matrix(self.rotations[j]), self.jacobians[j]
+        linear = J[:3] + np.cross(J[3:], R @ x, axis=0)
+        return FramePoint(self.positions[j] + R @ x, R, linear, J[3:])
 
 
 def configuration(model: Articulation, q: FloatArray) -> Configuration:
@@ -81,8 +85,31 @@ class IKTask(Protocol):
         """Return the residual, (row,), and its derivative by the velocity, (row, freedom)."""
 
 
+class BuiltInTask(KeepsReadOnly):
+    """A task of Plumbob, which kernels evaluate."""
+
+    kind: ClassVar[int]
+    weight: float
+    exact: bool
+
+    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
+        """Return the residual, (row,), and its derivative by the velocity, (row, freedom)."""
+        model, q, positions, rotations, _ = configuration
+        arrays = task_arrays(model, [self], [self.kind], [self.factors(model)])
+        arrays.records["weight"] = 1.0
+        state = new_state(model, arrays)
+        state.data.q[:], state.data.positions[:] = q, positions
+        state.data.rotations[:] = rotations
+        evaluation_kernel(state, state.current)
+        return state.current.r, state.current.J.T
+
+    @abstractmethod
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,); raise an error if another model is meant."""
+
+
 @dataclass(frozen=True, eq=False)
-class FrameTask(KeepsReadOnly):
+class FrameTask(BuiltInTask):
     """A position, a rotation, or both, of a frame in the world or relative to another frame.
 
     The position is that of `point`. Its error is along the axes of the target rotation, or of the
@@ -101,6 +128,7 @@ class FrameTask(KeepsReadOnly):
         exact: whether the task has to be met.
     """
 
+    kind: ClassVar[int] = FRAME
     frame: int | str
     position: Values | None = None
     rotation: Values | None = None
@@ -123,31 +151,13 @@ class FrameTask(KeepsReadOnly):
             Q = rotation.unit("rotation", arguments.array("rotation", self.rotation, 4))
             self.__dict__["rotation"] = frozen(Q)
 
-    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """Return the errors of position [m] and rotation [rad], and their derivative."""
-        frame = configuration.frame(self.frame, self.point)
-        base = configuration.frame(self.relative_to)
-        target = None if self.rotation is None else tuple(self.rotation.tolist())
-        turn = None if target is None else matrix_of(target)
-        residuals, derivatives = [], []
-        if self.position is not None:
-            into = base.matrix.T if turn is None else turn.T @ base.matrix.T
-            offset = frame.position - base.position
-            J = frame.linear - base.linear + cross_matrix(offset) @ base.angular
-            shift = self.position if turn is None else turn.T @ self.position
-            residuals.append(self.axes[:3] * (into @ offset - shift))
-            derivatives.append(self.axes[:3, None] * (into @ J))
-        if turn is not None:
-            relative = multiply(conjugate(base.quaternion), frame.quaternion)
-            error = np.array(logarithm(multiply(conjugate(target), relative)))
-            J = inverse_right_jacobian(error) @ frame.matrix.T @ (frame.angular - base.angular)
-            residuals.append(self.axes[3:] * error)
-            derivatives.append(self.axes[3:, None] * J)
-        return np.concatenate(residuals), np.concatenate(derivatives)
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,)."""
+        return self.axes[3 * (self.position is None) : 3 + 3 * (self.rotation is not None)]
 
 
 @dataclass(frozen=True, eq=False)
-class LookAt(KeepsReadOnly):
+class LookAt(BuiltInTask):
     """An axis of a frame points at a point of another frame, or of the world.
 
     The residual is the difference of the two unit directions: its length is the chord of the angle.
@@ -162,6 +172,7 @@ class LookAt(KeepsReadOnly):
         exact: whether the task has to be met.
     """
 
+    kind: ClassVar[int] = LOOK_AT
     frame: int | str
     target: Values
     axis: Values = (0.0, 0.0, 1.0)
@@ -179,20 +190,13 @@ class LookAt(KeepsReadOnly):
             raise ValueError("axis: expected a direction, got (0, 0, 0)")
         self.__dict__["axis"] = frozen(self.axis / length)
 
-    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """Return the axis less the direction to the target, and its derivative."""
-        eye = configuration.frame(self.frame, self.origin)
-        target = configuration.frame(self.target_frame, self.target)
-        axis, offset = eye.matrix @ self.axis, target.position - eye.position
-        distance = float(np.linalg.norm(offset)) or 1.0
-        direction = offset / distance
-        across = (np.eye(3) - np.outer(direction, direction)) / distance
-        J = -cross_matrix(axis) @ eye.angular - across @ (target.linear - eye.linear)
-        return axis - direction, J
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,)."""
+        return np.ones(3)
 
 
 @dataclass(frozen=True, eq=False)
-class CentreOfMass(KeepsReadOnly):
+class CentreOfMass(BuiltInTask):
     """The centre of mass at a position.
 
     Attributes:
@@ -205,6 +209,7 @@ class CentreOfMass(KeepsReadOnly):
         exact: whether the task has to be met.
     """
 
+    kind: ClassVar[int] = CENTRE_OF_MASS
     masses: Values
     centres: Values
     position: Values
@@ -223,19 +228,14 @@ class CentreOfMass(KeepsReadOnly):
             raise ValueError("masses: expected a positive sum, got 0")
         _keep(self, arguments.coordinates, centres=(len(self.masses), 3), position=3)
 
-    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """Return the error of the position [m], and its derivative."""
-        arguments.check_shape("masses", self.masses, configuration.model.joint_count)
-        arms = rotation.rotate(configuration.rotations, self.centres)
-        shares = self.masses / self.masses.sum()
-        centre = shares @ (configuration.positions + arms)
-        linear, angular = configuration.jacobians[:, :3], configuration.jacobians[:, 3:]
-        J = np.einsum("j,jif->if", shares, linear + np.cross(angular, arms[:, :, None], axis=1))
-        return self.axes * (centre - self.position), self.axes[:, None] * J
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,)."""
+        arguments.check_shape("masses", self.masses, model.joint_count)
+        return self.axes
 
 
 @dataclass(frozen=True, eq=False)
-class Posture(KeepsReadOnly):
+class Posture(BuiltInTask):
     """Coordinates to stay near, by default not exact.
 
     Attributes:
@@ -245,6 +245,7 @@ class Posture(KeepsReadOnly):
         exact: whether the task has to be met.
     """
 
+    kind: ClassVar[int] = POSTURE
     coordinates: Values
     axes: Values = 1.0
     weight: float = 0.01
@@ -256,24 +257,15 @@ class Posture(KeepsReadOnly):
         _keep(self, arguments.coordinates, coordinates="coordinate")
         _keep(self, arguments.sizes, axes="...")
 
-    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """Return the velocity from the posture to the configuration, and its derivative."""
-        model = configuration.model
-        rest = model.checked("coordinates", self.coordinates)
-        residual = difference(model, configuration.q, rest)
-        J = np.eye(model.freedom_count)
-        for joint in np.flatnonzero([kind in ("ball", "free") for kind in model.kinds]):
-            end = model.freedoms_of(int(joint)).stop
-            block = slice(end - 3, end)
-            J[block, block] = inverse_right_jacobian(residual[block])
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,)."""
         if self.axes.ndim > 0:
             arguments.check_shape("axes", self.axes, model.freedom_count)
-        axes = np.broadcast_to(self.axes, residual.shape)
-        return axes * residual, axes[:, None] * J
+        return np.broadcast_to(self.axes, model.freedom_count)
 
 
 @dataclass(frozen=True, eq=False)
-class Coupling(KeepsReadOnly):
+class Coupling(BuiltInTask):
     """A hinge or slide follows a polynomial of another: q - q0 = sum of c_k (leader - leader0)^k.
 
     Attributes:
@@ -286,6 +278,7 @@ class Coupling(KeepsReadOnly):
         exact: whether the task has to be met.
     """
 
+    kind: ClassVar[int] = COUPLING
     joint: int | str
     leader: int | str | None = None
     coefficients: Values = (0.0, 1.0)
@@ -303,50 +296,13 @@ class Coupling(KeepsReadOnly):
         for name in ("zero", "leader_zero"):
             arguments.number(name, getattr(self, name))
 
-    def evaluate(self, configuration: Configuration) -> tuple[FloatArray, FloatArray]:
-        """Return the error [rad or m], and its derivative."""
-        q, J = self._coordinate(configuration, self.joint)
-        polynomial = np.polynomial.Polynomial(self.coefficients)
-        residual = q - self.zero - polynomial(0.0)
-        if self.leader is not None:
-            leader, J_leader = self._coordinate(configuration, self.leader)
-            displacement = leader - self.leader_zero
-            residual = q - self.zero - polynomial(displacement)
-            J = J - polynomial.deriv()(displacement) * J_leader
-        return np.array([residual]), J[None]
-
-    def _coordinate(
-        self, configuration: Configuration, joint: int | str
-    ) -> tuple[float, FloatArray]:
-        """Return a joint's coordinate, a mimic joint's too, and its derivative, (freedom,)."""
-        model, j = configuration.model, configuration.model.index(joint)
-        if model.kinds[j] not in ("hinge", "slide"):
-            raise ValueError(f"joint: expected a hinge or a slide, got a {model.kinds[j]} joint")
-        record, J = model.joints[j], np.zeros(model.freedom_count)
-        J[record["freedom"]] = record["multiplier"]
-        q = record["multiplier"] * configuration.q[record["coordinate"]] + record["shift"]
-        return float(q), J
-
-
-def matrix_of(q: tuple[float, float, float, float]) -> FloatArray:
-    """Return the matrix of a single rotation, (3, 3), sooner than `rotation.to_matrix`."""
-    return np.array([rotate(q, axis) for axis in AXES]).T
-
-
-def cross_matrix(v: FloatArray) -> FloatArray:
-    """Return the matrix of the cross product v x, (3, 3)."""
-    x, y, z = v
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-
-
-def inverse_right_jacobian(v: FloatArray) -> FloatArray:
-    """Return the derivative of log(exp(v) exp(w)) by w at 0, (3, 3): Sola et al. 2018."""
-    angle = float(np.linalg.norm(v))
-    factor = 1.0 / 12.0 + angle * angle / 720.0
-    if angle > SMALL_ANGLE:
-        factor = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / (angle * angle)
-    K = cross_matrix(v)
-    return np.eye(3) + 0.5 * K + factor * (K @ K)
+    def factors(self, model: Articulation) -> FloatArray:
+        """Return the factors of the residual, (row,)."""
+        for joint in (self.joint, self.joint if self.leader is None else self.leader):
+            kind = model.kinds[model.index(joint)]
+            if kind not in ("hinge", "slide"):
+                raise ValueError(f"joint: expected a hinge or a slide, got a {kind} joint")
+        return np.ones(1)
 
 
 def _check(task: object) -> None:

@@ -15,6 +15,7 @@ from plumbob import (
     forward_kinematics,
     prepare,
     prepare_ik,
+    prepare_tasks,
     rotation,
     scenes,
     solve_ik,
@@ -62,6 +63,17 @@ def prepared_solves(model):
     return answer
 
 
+def prepared_tasks():
+    solve = prepare_tasks(ARM, [Target(np.zeros(3), rotation.identity())], restarts=1)
+
+    def answer(rng):
+        solve.set_target(0, rng.normal(size=3) * 0.6, rotation.random(rng))
+        outcome = solve(ARM.random(rng))
+        return np.concatenate([solve.coordinates, solve.errors, [outcome, solve.iterations]])
+
+    return answer
+
+
 def solves_of_many_seeds(rng):
     """Return solutions, each with restarts of its own, which the robot keeps for a while."""
     seed = int(rng.integers(400))
@@ -99,6 +111,7 @@ SHARED = {
     "prepare_ik, arm": lambda: prepared_solves(ARM),
     "solve_ik": lambda: solves_of_many_seeds,
     "solve_tasks": lambda: tasks,
+    "prepare_tasks": prepared_tasks,
     "all_solutions": lambda: solutions,
     **{f"ImplicitEuler, {solver}": lambda solver=solver: steps(solver) for solver in STEP_SOLVERS},
 }
