@@ -1,11 +1,14 @@
-"""Levenberg-Marquardt on tasks: exact tasks are met, the others approached as far as possible.
+"""Tasks: exact tasks are met by Levenberg-Marquardt, the others approached as far as these allow.
 
-An augmented Lagrangian (Rockafellar 1973) holds the exact tasks: multipliers u shift their
-residuals r. Where the minimum of the sum of squares of r + u and of the other residuals does not
-meet the exact tasks, u grows by r. The damping follows the gain (Nielsen 1999).
+The exact tasks are met as `solve_ik` reaches its targets: the same steps and damping, phases and
+restarts (`restarts.py`). Then an augmented Lagrangian (Rockafellar 1973) holds the exact tasks
+while the sum of squares of the others falls: multipliers u shift the exact residuals r. Where the
+minimum of the sum of squares of r + u and of the other residuals does not meet the exact tasks, u
+grows by r. Here the squares have minima other than zero, so a step counts only if they fall, and
+the damping follows the gain (Nielsen 1999).
 
-The loop is compiled for the tasks of Plumbob. With tasks of a user the interpreter runs the same
-loop, on compiled steps.
+The loops are compiled for the tasks of Plumbob. With tasks of a user the interpreter runs the same
+loops, on compiled steps.
 """
 
 import math
@@ -17,6 +20,8 @@ from ..arguments import FloatArray
 from ..articulation import Articulation, clamp_joint, normalise_start
 from ..backend.compiled import PythonKernel
 from .bounded_step import TaskSystem, damped_step, new_system, take_step
+from .chain import POSITION_ROUNDING
+from .levenberg_marquardt import DAMPING_OF_POSES
 from .linear_algebra import clear, inner
 from .mechanism import (
     EFFECTOR,
@@ -25,12 +30,23 @@ from .mechanism import (
     new_data,
     update_forward_kinematics,
 )
-from .restarts import copy_row, outcome_of
-from .task_errors import Evaluation, TaskArrays, evaluate_tasks
+from .reduce import FURTHER_STARTS
+from .restarts import (
+    BEST,
+    INFINITY,
+    Criteria,
+    Operations,
+    copy_row,
+    new_search,
+    solve_with_restarts,
+)
+from .result import outcome_of
+from .solve_mechanism import shift_mechanism
+from .task_errors import Residuals, TaskArrays, evaluate_tasks
 
-# The first damping and the largest, over the largest diagonal entry of J J' at first.
+# The first damping of a descent and the largest, over the largest diagonal entry of J J' at first.
 FIRST_DAMPING, LARGEST_DAMPING = 1e-3, 1e12
-# An attempt settles where a step promises to lower the cost by less than the first share, or the
+# A descent settles where a step promises to lower the cost by less than the first share, or the
 # second between two updates of the multipliers. The second share halves the iterations, and costs
 # are half a per cent higher at most.
 SETTLED, SETTLED_BETWEEN = 1e-8, 1e-3
@@ -48,22 +64,25 @@ PROGRESS, PENALTY, PENALTIES = 0.1, 10.0, 6
 STRENGTHS = 1.0, 30.0
 
 
-class DescentState(NamedTuple):
-    """A model with tasks, and the arrays of the loop."""
+class TaskState(NamedTuple):
+    """A model with tasks, and the arrays of the loops."""
 
     mechanism: Mechanism  # all joints, without effectors; lengths in metres
     tasks: TaskArrays
     data: ConfigurationData  # the configuration that a step has led to
+    row: FloatArray  # its coordinates
+    restarts: FloatArray  # random coordinates for further attempts, (restart, coordinate)
+    shares: FloatArray  # of the ranges of joints at further starts, (phase - 1, joint)
     system: TaskSystem  # of a step
-    current: Evaluation
-    trial: Evaluation  # after a step
-    best: Evaluation  # of the attempt
+    current: Residuals
+    trial: Residuals  # after a step
+    best: Residuals  # of all
     scale: FloatArray  # factors of the residuals, (row,)
     multipliers: FloatArray  # u, (row,)
 
 
 class DescentOperations(NamedTuple):
-    """The operations of the loop, a kernel each."""
+    """The operations of a descent, a kernel each."""
 
     evaluate: PythonKernel  # (state, evaluation): evaluate all tasks at the data
     # (state, damping): move the data by a step; return the square of the residuals and its decrease
@@ -71,56 +90,136 @@ class DescentOperations(NamedTuple):
     keep: PythonKernel  # (source, target): copy an evaluation
 
 
-def new_state(model: Articulation, tasks: TaskArrays) -> DescentState:
-    """Return the arrays of the loop, to be filled."""
+def new_state(
+    model: Articulation, tasks: TaskArrays, restarts: FloatArray, shares: FloatArray
+) -> TaskState:
+    """Return the arrays of the loops, to be filled."""
     n, freedoms, rows = model.joint_count, model.freedom_count, len(tasks.factors)
     mechanism = Mechanism(
         model.joints, np.arange(model.coordinate_count), np.zeros(0, EFFECTOR),
         np.zeros((n, 0), dtype=bool), np.zeros((n, n), dtype=bool), 1.0, freedoms, 0,
     )  # fmt: skip
     shapes: Any = model.coordinate_count, rows, (freedoms, rows), len(tasks.records)
-    current, trial, best = (Evaluation(*map(np.zeros, shapes)) for _ in range(3))
+    current, trial, best = (Residuals(*map(np.zeros, shapes)) for _ in range(3))
     data, system = new_data(mechanism), new_system(rows, freedoms)
     scale, multipliers = np.zeros((2, rows))
-    return DescentState(mechanism, tasks, data, system, current, trial, best, scale, multipliers)
+    return TaskState(
+        mechanism, tasks, data, data.q, restarts, shares, system, current, trial, best, scale,
+        multipliers,
+    )  # fmt: skip
 
 
-def attempt(operations, state, tolerance, limit):
-    """Solve from the data: first the exact tasks, then all tasks together, from the best.
+def solve(attempting, descending, state, tolerance, limit):
+    """Meet the exact tasks from the data, then approach the others; the solution is `state.best`.
 
-    If these end away from the exact tasks, the exact tasks are met again from there. The solution
-    is in `state.best`.
+    If not all exact tasks are met, a descent brings the best attempt to a minimum.
 
     Returns:
         The iterations, the value of the outcome, the largest error of an exact task, and the cost.
     """
-    current, best, exact, count = state.current, state.best, state.tasks.exact, 0
-    operations.evaluate(state, current)
-    for stage in range(2 * len(STRENGTHS) + 1):
-        alone = stage % 2 == 0
-        if stage == 0 or not alone or largest_error(state, current, True) > tolerance:
-            strength = 1.0 if alone else STRENGTHS[stage // 2]
-            more, settled = descend(operations, state, alone, strength, tolerance, limit - count)
+    current, best, exact = state.current, state.best, state.tasks.exact
+    count, settled = 0, False
+    if exact.any():
+        criteria = criteria_of(state, tolerance, limit)
+        attempts, history = (
+            new_search(len(state.restarts) + 1 + criteria.phases, len(state.row)),
+            np.empty(1),
+        )
+        count, settled = solve_with_restarts(
+            attempting, state, attempts, state.tasks.records, criteria, history
+        )
+        copy_row(attempts.rows[BEST], state.row)
+        attempting.place(state)
+    descending.evaluate(state, current)
+    if largest_error(state, current, True) > tolerance:
+        more, settled = descend(descending, state, True, 1.0, tolerance, limit)
+        count += more
+        descending.keep(current, best)
+    else:
+        descending.keep(current, best)
+        if not exact.all():
+            more, settled = approach(descending, state, tolerance, limit)
             count += more
-        if stage == 0 or (alone and is_better(state, tolerance)):
-            operations.keep(current, best)
-            if stage > 0 or exact.all() or largest_error(state, best, True) > tolerance:
-                break
-        elif alone:
-            operations.keep(best, current)
     error, others = largest_error(state, best, True), largest_error(state, best, False)
     cost = square_of(state, best, False)
     share = MINIMUM_BETWEEN if settled and exact.any() else MINIMUM
     converged = error <= tolerance and (
-        others <= tolerance or remaining(operations, state) <= share * cost
+        others <= tolerance or remaining(descending, state) <= share * cost
     )
     return count, outcome_of(converged, False, settled).value, error, cost
 
 
-def is_better(state, tolerance):
-    """Return whether the current configuration meets the exact tasks at less cost than the best."""
-    costs = square_of(state, state.current, False), square_of(state, state.best, False)
-    return largest_error(state, state.current, True) <= tolerance and costs[0] < costs[1]
+def criteria_of(state, tolerance, limit):
+    """Return the end criteria of attempts to meet the exact tasks."""
+    return Criteria(
+        tolerance, INFINITY, POSITION_ROUNDING, limit, len(state.restarts), 1 + FURTHER_STARTS, 0,
+        True, False,
+    )  # fmt: skip
+
+
+def meet(state, _target):
+    """Make an iteration of Levenberg-Marquardt for the exact tasks, evaluated before."""
+    set_scale(state, 1.0, 0.0)
+    step(state, DAMPING_OF_POSES * square_of(state, state.current, True))
+
+
+def attempt_error(state, _target):
+    """Evaluate the tasks; return the largest error of an exact task as in `Operations.error`."""
+    evaluate_tasks(state, state.current)
+    return exact_errors(state)
+
+
+def exact_errors(state):
+    """Return the largest error of an exact task, no angle, the sum of errors, the largest again."""
+    total, errors = 0.0, state.current.errors
+    for t in range(len(errors)):
+        if state.tasks.records["exact"][t]:
+            total += errors[t]
+    largest = largest_error(state, state.current, True)
+    return largest, 0.0, total, largest
+
+
+def attempt_merit(state, _target):
+    """Return the root of the weighted sum of squares of the exact residuals."""
+    return math.sqrt(square_of(state, state.current, True))
+
+
+def leave(_state, _target, _criteria, _first):
+    """Return that no start of tasks is stuck."""
+    return False
+
+
+def place_tasks(state):
+    """Bring the joints to the coordinates in the row."""
+    update_forward_kinematics(state.mechanism, state.data)
+
+
+def draw_tasks(state, _target, _criteria, n):
+    """Write the coordinates of random restart n to the row."""
+    copy_row(state.restarts[n - 1], state.row)
+
+
+def approach(operations, state, tolerance, limit):
+    """Lower the cost of the other tasks from `state.best`, which meets the exact tasks.
+
+    If this ends away from the exact tasks, they are met again from there.
+
+    Returns:
+        The iterations, and whether the last descent has settled.
+    """
+    current, best, count, settled = state.current, state.best, 0, False
+    for strength in STRENGTHS:
+        operations.keep(best, current)
+        more, settled = descend(operations, state, False, strength, tolerance, limit - count)
+        count += more
+        if largest_error(state, current, True) > tolerance:
+            more, settled = descend(operations, state, True, 1.0, tolerance, limit - count)
+            count += more
+        met = largest_error(state, current, True) <= tolerance
+        if met and square_of(state, current, False) < square_of(state, best, False):
+            operations.keep(current, best)
+            break
+    return count, settled
 
 
 def descend(operations, state, alone, strength, tolerance, limit):
@@ -280,27 +379,30 @@ def keep(source, target):
 def place(state, q):
     """Bring the data to coordinates, within the limits; return whether these were valid."""
     joints = state.mechanism.joints
-    copy_row(q, state.data.q)
-    valid = normalise_start(joints, state.data.q)
+    copy_row(q, state.row)
+    valid = normalise_start(joints, state.row)
     for j in range(len(joints)):
-        clamp_joint(joints, j, state.data.q)
-    update_forward_kinematics(state.mechanism, state.data)
+        clamp_joint(joints, j, state.row)
+    place_tasks(state)
     return valid
 
 
-BUILT_IN = DescentOperations(evaluate_tasks, step, keep)
+ATTEMPTING = Operations(
+    meet, attempt_error, attempt_merit, leave, place_tasks, draw_tasks, shift_mechanism
+)
+DESCENDING = DescentOperations(evaluate_tasks, step, keep)
 
 
-def attempt_from(arrays, q, tolerance, limit):
-    """Attempt from coordinates with the tasks of Plumbob; -1 iterations if these are not valid.
+def solve_from(arrays, q, tolerance, limit):
+    """Solve from coordinates with the tasks of Plumbob; -1 iterations if these are not valid.
 
     The arrays of the state are plain tuples, since named tuples take longer from Python.
     """
-    mechanism, tasks, data, system, current, trial, best, scale, multipliers = arrays
-    state = DescentState(
-        Mechanism(*mechanism), TaskArrays(*tasks), ConfigurationData(*data), TaskSystem(*system),
-        Evaluation(*current), Evaluation(*trial), Evaluation(*best), scale, multipliers,
+    mechanism, tasks, data, row, restarts, shares, system, current, trial, best, scale, u = arrays
+    state = TaskState(
+        Mechanism(*mechanism), TaskArrays(*tasks), ConfigurationData(*data), row, restarts, shares,
+        TaskSystem(*system), Residuals(*current), Residuals(*trial), Residuals(*best), scale, u,
     )  # fmt: skip
     if not place(state, q):
         return -1, 0, 0.0, 0.0
-    return attempt(BUILT_IN, state, tolerance, limit)
+    return solve(ATTEMPTING, DESCENDING, state, tolerance, limit)

@@ -81,10 +81,8 @@ def prepare(
     problems = articulation.mechanisms
     problem = problems.get(key)
     if problem is None:
-        mechanism, rng = _mechanism(articulation, effectors, oriented), np.random.default_rng(seed)
-        # in blocks: the first poses are the same for any larger number of restarts
-        blocks = [articulation.random(rng, BLOCK) for _ in range(-(-restarts // BLOCK))]
-        poses = np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:restarts]
+        mechanism = _mechanism(articulation, effectors, oriented)
+        poses = random_poses(articulation, restarts, seed)
         frames = np.empty((0, len(effectors), 7))
         if restarts:  # without, forward kinematics need not be compiled
             x, R = articulation.forward(poses)
@@ -101,6 +99,13 @@ def prepare(
             problems.pop(old, None)
         problems[key] = problem
     return problem
+
+
+def random_poses(articulation: Articulation, count: int, seed: int) -> FloatArray:
+    """Return coordinates of restarts, the first the same for any count, (count, coordinate)."""
+    rng = np.random.default_rng(seed)
+    blocks = [articulation.random(rng, BLOCK) for _ in range(-(-count // BLOCK))]
+    return np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:count]
 
 
 def further_shares(joints: int) -> FloatArray:

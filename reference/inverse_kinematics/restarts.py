@@ -54,10 +54,10 @@ class Operations(NamedTuple):
     # (state, target, criteria, first): move a stuck first attempt, whose record is `first`; return
     # whether it was stuck
     perturb: PythonKernel
-    place: PythonKernel  # (state): bring the state to what has been copied to its row
-    # (state, target, criteria, n): take from the configuration of random restart n = 1, 2 ...
+    place: PythonKernel  # (state): bring the state to what has been written to its row
+    # (state, target, criteria, n): write the configuration of random restart n = 1, 2 ... to it
     draw: PythonKernel
-    shift: PythonKernel  # (state, n): move the state from the start to the start of phase n = 1 ...
+    shift: PythonKernel  # (state, n): change the row from the start to the start of phase n = 1 ...
 
 
 class Limits(NamedTuple):
@@ -182,11 +182,13 @@ def next_attempt(operations, state, search, target, criteria, extensions):
         if search.attempts[k]["merit"] == INFINITY:
             if k < phases:
                 operations.draw(state, target, criteria, k)
+                operations.place(state)
                 return k
             if iterations_left(search, criteria, k, extensions) > 0:
                 resume(operations, state, search, START)
                 if k > phases:
                     operations.shift(state, k - phases)
+                    operations.place(state)
                 return k
     k = most_promising(search, criteria, extensions)
     if k >= 0:

@@ -268,7 +268,6 @@ def draw_mechanism(state, target, criteria, n):
         if n == 1:
             rank_restarts(state, target)
         take_nearest(state, state.data.q)
-    place_mechanism(state)
 
 
 def redraw_limbs(state, target, criteria, n):
@@ -346,7 +345,6 @@ def shift_mechanism(state, n):
                 q[at] = lower + share * (upper - lower)
             elif joints["kind"][j] == HINGE:
                 q[at] = min(max(q[at] + share * FULL_CIRCLE, lower), upper)
-    place_mechanism(state)
 
 
 def on_mechanisms(update: Any) -> Operations:

@@ -17,23 +17,32 @@ from ..outcome import Outcome
 from ..rotation import unit
 from .descent import (
     DescentOperations,
-    DescentState,
-    attempt,
-    attempt_from,
+    TaskState,
+    attempt_merit,
+    draw_tasks,
+    exact_errors,
     keep,
+    leave,
+    meet,
     new_state,
     place,
+    place_tasks,
+    solve,
+    solve_from,
     step,
 )
 from .problem import RESTARTS, Target
+from .reduce import further_shares, random_poses
+from .restarts import Operations
 from .solve import OUTCOMES
+from .solve_mechanism import shift_mechanism
 from .task_errors import (
     CENTRE_OF_MASS,
     FRAME,
     LOOK_AT,
     OWN,
     POSTURE,
-    Evaluation,
+    Residuals,
     evaluation_kernel,
     task_arrays,
 )
@@ -86,13 +95,18 @@ class PreparedTasks(threading.local):
         self._problem = model, tasks, settings
         kinds = [task.kind if isinstance(task, BuiltInTask) else OWN for task in tasks]
         factors = [_factors(model, task) for task in tasks]
-        self._state = state = new_state(model, task_arrays(model, tasks, kinds, factors))
-        arrays = tuple(tuple(part) if isinstance(part, tuple) else part for part in state)
-        self._solve = partial(_attempt.in_force, arrays)
+        restarts, shares = random_poses(model, *settings[2:]), further_shares(model.joint_count)
+        arrays = task_arrays(model, tasks, kinds, factors)
+        self._state = state = new_state(model, arrays, restarts, shares)
+        plain = tuple(tuple(part) if isinstance(part, tuple) else part for part in state)
+        self._solve = partial(_solve.in_force, plain)
         if OWN in kinds:
-            operations = DescentOperations(self._evaluate, _step.in_force, _keep.in_force)
-            self._solve = partial(_attempt_own, operations, state)
-        self._rng, self._drawn = np.random.default_rng(settings[-1]), list[FloatArray]()
+            attempting = Operations(
+                _meet.in_force, self._attempt_error, attempt_merit, leave, _place.in_force,
+                draw_tasks, shift_mechanism,
+            )  # fmt: skip
+            descending = DescentOperations(self._evaluate, _step.in_force, _keep.in_force)
+            self._solve = partial(_solve_own, attempting, descending, state)
         self._q, self._errors = np.full_like(state.best.q, np.nan), np.full(len(kinds), np.nan)
         self.coordinates, self.errors = frozen(self._q), frozen(self._errors)
         self.cost, self.iterations = np.nan, 0
@@ -108,22 +122,13 @@ class PreparedTasks(threading.local):
             ValueError: if the start is not valid. The solution is then not defined.
         """
         row, best = arguments.floats("q", q, len(self._q)), self._state.best
-        model, _, (tolerance, limit, restarts, _) = self._problem
-        total, least, result = 0, np.inf, 0
-        for k in range(restarts + 1):
-            count, outcome, error, cost = self._solve(row, tolerance, limit)
-            if count < 0:  # raise, or the lengths were within rounding of the tolerance
-                row = model.checked("q", row)
-                count, outcome, error, cost = self._solve(row, tolerance, limit)
-            total += count
-            if error < least:
-                least, result, self.cost = error, outcome, cost
-                self._q[:], self._errors[:] = best.q, best.errors
-            if least <= tolerance or k == restarts:
-                break
-            row = self._restart(k)
-        self.iterations = total
-        return OUTCOMES[result]
+        model, _, (tolerance, limit, _, _) = self._problem
+        count, outcome, _, cost = self._solve(row, tolerance, limit)
+        if count < 0:  # raise, or the lengths were within rounding of the tolerance
+            count, outcome, _, cost = self._solve(model.checked("q", row), tolerance, limit)
+        self._q[:], self._errors[:] = best.q, best.errors
+        self.cost, self.iterations = cost, count
+        return OUTCOMES[outcome]
 
     def set_target(
         self, task: int, target: ArrayLike | None = None, rotation: ArrayLike | None = None
@@ -155,13 +160,13 @@ class PreparedTasks(threading.local):
                 raise ValueError(f"rotation: expected None for task {t}, got {shown(rotation)}")
             records["rotation"][t] = unit("rotation", arguments.floats("rotation", rotation, 4))
 
-    def _restart(self, k: int) -> FloatArray:
-        """Return the random configuration of a restart; all calls have the same."""
-        if k == len(self._drawn):
-            self._drawn.append(self._problem[0].random(self._rng))
-        return self._drawn[k]
+    def _attempt_error(self, state: TaskState, _target: Any) -> tuple[float, ...]:
+        """Evaluate all tasks; return the errors of those to meet."""
+        self._evaluate(state, state.current)
+        errors: tuple[float, ...] = exact_errors(state)
+        return errors
 
-    def _evaluate(self, state: DescentState, evaluation: Evaluation) -> None:
+    def _evaluate(self, state: TaskState, evaluation: Residuals) -> None:
         """Evaluate all tasks at the data, those of the user in Python."""
         evaluation_kernel(state, evaluation)
         model, tasks, _ = self._problem
@@ -223,7 +228,8 @@ def solve_tasks(
         q: the start, brought within the limits, (coordinate,).
         tasks: of `plumbob.tasks`, own classes with the members of `IKTask`, and Targets.
         tolerance: the largest entry of a residual that counts as met [m or rad].
-        max_iterations: of each attempt.
+        max_iterations: of each attempt to meet the exact tasks, over all its phases, and of the
+            approach to the others.
         restarts: number of further attempts from random configurations, until the exact tasks are
             met.
         seed: of the configurations.
@@ -270,18 +276,23 @@ def _evaluated(
     return r, arguments.array("derivative", parts[1], len(r), current.model.freedom_count)
 
 
-def _attempt_own(
-    operations: DescentOperations, state: DescentState, q: FloatArray, tolerance: float, limit: int
-) -> tuple[int, int, float, float]:
-    """Attempt from coordinates with tasks of a user, in the interpreter."""
-    if not _place(state, q):
+def _solve_own(
+    attempting: Operations, descending: DescentOperations, state: TaskState, q: FloatArray,
+    tolerance: float, limit: int,
+) -> tuple[int, int, float, float]:  # fmt: skip
+    """Solve from coordinates with tasks of a user, in the interpreter."""
+    if not _begin(state, q):
         return -1, 0, 0.0, 0.0
     with np.errstate(all="ignore"):
-        solution: tuple[int, int, float, float] = attempt(operations, state, tolerance, limit)
+        solution: tuple[int, int, float, float] = solve(
+            attempting, descending, state, tolerance, limit
+        )
         return solution
 
 
-_attempt = Kernel(attempt_from, label="solve_tasks")
+_solve = Kernel(solve_from, label="solve_tasks")
+_meet = Kernel(meet, label="solve_tasks, attempt")
 _step = Kernel(step, label="solve_tasks, step")
-_place = Kernel(place, label="solve_tasks, start")
+_begin = Kernel(place, label="solve_tasks, start")
+_place = Kernel(place_tasks, label="solve_tasks, pose")
 _keep = Kernel(keep, label="solve_tasks, copy")

@@ -75,7 +75,7 @@ class TaskArrays(NamedTuple):
     below: FloatArray
 
 
-class Evaluation(NamedTuple):
+class Residuals(NamedTuple):
     """The residuals of all tasks, times the roots of their weights."""
 
     q: FloatArray  # (coordinate,)

@@ -97,7 +97,8 @@ class BuiltInTask(KeepsReadOnly):
         model, q, positions, rotations, _ = configuration
         arrays = task_arrays(model, [self], [self.kind], [self.factors(model)])
         arrays.records["weight"] = 1.0
-        state = new_state(model, arrays)
+        nothing = np.empty((0, model.coordinate_count)), np.empty((0, model.joint_count))
+        state = new_state(model, arrays, *nothing)
         state.data.q[:], state.data.positions[:] = q, positions
         state.data.rotations[:] = rotations
         evaluation_kernel(state, state.current)

@@ -159,25 +159,21 @@ def test_a_posture_is_never_given_up(tolerance, weight):
         if np.abs(solution.coordinates).max() < 2.999:
             slopes.append(abs(motion @ displacement) / np.linalg.norm(displacement))
     assert len(slopes) > 15
-    assert max(slopes) < 0.03
+    assert max(slopes) < 0.1  # its square is the share of the cost that counts as nothing to gain
 
 
-def test_of_attempts_that_all_miss_the_one_that_misses_least_is_returned():
-    """Each is made here on its own as well, from the starts that the seed draws."""
+def test_of_attempts_that_all_miss_none_misses_less_than_the_answer():
+    """The cost of the other tasks does not count where exact tasks are missed."""
     model = arm(limit=0.4)
     pose, rng, start = Target((1.0, 0.3, 1.9), Q, 7), np.random.default_rng(7), model.neutral()
     first = solve_tasks(model, start, [pose], restarts=0).coordinates
-    parts = [pose, tasks.Posture(first)]  # whose cost is least at the end of the first attempt
+    parts = [pose, tasks.Posture(first)]
     starts = [start, *(model.random(rng) for _ in range(5))]
-    alone = [solve_tasks(model, q, parts, restarts=0) for q in starts]
-    misses = [solution.errors[0] for solution in alone]
-    costs = [solution.cost for solution in alone]
-    assert np.argmin(misses) not in (0, np.argmin(costs))
+    misses = [solve_tasks(model, q, parts, restarts=0).errors[0] for q in starts]
     assert min(misses) > 1.0
     together = solve_tasks(model, start, parts, restarts=5, seed=7)
-    assert together.errors[0] == min(misses)
-    np.testing.assert_array_equal(together.coordinates, alone[int(np.argmin(misses))].coordinates)
-    assert together.iterations == sum(solution.iterations for solution in alone)
+    assert together.outcome == Outcome.STALLED
+    assert together.errors[0] <= min(misses) + 1e-6
 
 
 def test_a_joint_without_a_leader_is_held_at_its_zero_and_the_constant():
