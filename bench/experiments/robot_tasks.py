@@ -50,17 +50,29 @@ def blocks(scale: Scale) -> Iterator[Block]:
             facts["title"] = f"{title(name)}, {ROBOT_TASKS[task].title}"
             settings = {"version": peer.version, "seed": scale.seed, "attempts": kind}
             measure = partial(meet, name, task, peer, kind, count, scale.seed)
+            block = partial(Block, SUITE, f"{task}/{name}")
             solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
-            yield Block(SUITE, f"{task}/{name}", solver, measure, settings, count, facts)
+            yield block(solver, measure, settings, count, facts)
+            if peer is PLUMBOB_LM:
+                measure = partial(measure, prepared=False)
+                yield block(f"{solver}, plain call", measure, settings, count, facts)
 
 
-def meet(name: str, task_name: str, peer: Peer, kind: str, count: int, seed: int) -> Measured:
+def meet(
+    name: str,
+    task_name: str,
+    peer: Peer,
+    kind: str,
+    count: int,
+    seed: int,
+    prepared: bool = True,
+) -> Measured:
     """Solve all targets by a solver, from one start or with restarts; MuJoCo evaluates them."""
     announce(f"{task_name}, {name}, {peer.title}")
     arm, task, entry = robot(name), ROBOT_TASKS[task_name], peer.first(kind)
     module, settings = importlib.import_module(peer.module), entry.settings
     if peer is PLUMBOB_LM:
-        settings = {"restarts": settings["restarts"]}
+        settings = {"restarts": settings["restarts"], "prepared": prepared}
     try:
         make_solve = module.prepare_task(arm, task, TOLERANCE, **settings)
     except UnableError as error:

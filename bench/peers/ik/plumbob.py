@@ -13,6 +13,7 @@ from plumbob.reference import (
     Target,
     all_solutions,
     prepare_ik,
+    prepare_tasks,
     rotation,
     solve_ik,
     solve_tasks,
@@ -107,7 +108,11 @@ def _read(solution: IKSolution | TaskSolution) -> tuple[FloatArray | None, bool]
 
 
 def prepare_task(
-    robot: BenchRobot, task: RobotTask, tolerance: float, restarts: int = 0
+    robot: BenchRobot,
+    task: RobotTask,
+    tolerance: float,
+    restarts: int = 0,
+    prepared: bool = True,
 ) -> Callable[[TaskRequest], Solve]:
     """Return the solver of a task, set up for an arm."""
     arm, base = urdf.parse(robot.text), first_link(evaluator_of(robot.name))
@@ -117,8 +122,12 @@ def prepare_task(
     def make_solve(request: TaskRequest) -> Solve:
         goal = tasks.configuration(arm.articulation, request.goal)
         parts = [_task(robot, part, arm, goal, base) for part in task.parts]
-        solve = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
-        return Solve(solve, _read)
+        if not prepared:
+            solve = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
+            return Solve(solve, _read)
+        tasks_of_arm = prepare_tasks(arm.articulation, parts, **settings)
+        call = partial(tasks_of_arm, request.start)
+        return Solve(call, lambda o: (tasks_of_arm.coordinates.copy(), o == Outcome.CONVERGED))
 
     return make_solve
 
