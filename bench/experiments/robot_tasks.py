@@ -72,7 +72,8 @@ def meet(
     arm, task, entry = robot(name), ROBOT_TASKS[task_name], peer.first(kind)
     module, settings = importlib.import_module(peer.module), entry.settings
     if peer is PLUMBOB_LM:
-        settings = {"restarts": settings["restarts"], "prepared": prepared}
+        settings = {name: settings.get(name) for name in ("restarts", "phases")}
+        settings["prepared"] = prepared
     try:
         make_solve = module.prepare_task(arm, task, TOLERANCE, **settings)
     except UnableError as error:

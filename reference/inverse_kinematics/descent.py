@@ -30,7 +30,6 @@ from .mechanism import (
     new_data,
     update_forward_kinematics,
 )
-from .reduce import FURTHER_STARTS
 from .restarts import (
     BEST,
     INFINITY,
@@ -151,9 +150,10 @@ def solve(attempting, descending, state, tolerance, limit):
 
 def criteria_of(state, tolerance, limit):
     """Return the end criteria of attempts to meet the exact tasks."""
+    restarts, phases = len(state.restarts), 1 + len(state.shares)
     return Criteria(
-        tolerance, INFINITY, POSITION_ROUNDING, limit, len(state.restarts), 1 + FURTHER_STARTS, 0,
-        True, False,
+        tolerance, INFINITY, POSITION_ROUNDING, limit, restarts, phases, 0, restarts + phases > 1,
+        False,
     )  # fmt: skip
 
 

@@ -31,7 +31,7 @@ from .descent import (
     solve_from,
     step,
 )
-from .problem import RESTARTS, Target
+from .problem import PHASE_COUNTS, RESTARTS, Target
 from .reduce import further_shares, random_poses
 from .restarts import Operations
 from .solve import OUTCOMES
@@ -50,6 +50,7 @@ from .tasks import BuiltInTask, Configuration, FrameTask, IKTask, configuration
 
 # The default, twice that of `solve_ik`: exact tasks take several descents.
 MAX_ITERATIONS = 200
+PHASES = PHASE_COUNTS["levenberg_marquardt"]
 # The target of each kind of task.
 TARGETS = {FRAME: "position", LOOK_AT: "target", CENTRE_OF_MASS: "position", POSTURE: "coordinates"}
 
@@ -95,7 +96,8 @@ class PreparedTasks(threading.local):
         self._problem = model, tasks, settings
         kinds = [task.kind if isinstance(task, BuiltInTask) else OWN for task in tasks]
         factors = [_factors(model, task) for task in tasks]
-        restarts, shares = random_poses(model, *settings[2:]), further_shares(model.joint_count)
+        restarts, shares = random_poses(model, *settings[2:4]), further_shares(model.joint_count)
+        shares = shares[: settings[4] - 1]
         arrays = task_arrays(model, tasks, kinds, factors)
         self._state = state = new_state(model, arrays, restarts, shares)
         plain = tuple(tuple(part) if isinstance(part, tuple) else part for part in state)
@@ -122,7 +124,7 @@ class PreparedTasks(threading.local):
             ValueError: if the start is not valid. The solution is then not defined.
         """
         row, best = arguments.floats("q", q, len(self._q)), self._state.best
-        model, _, (tolerance, limit, _, _) = self._problem
+        model, _, (tolerance, limit, *_) = self._problem
         count, outcome, _, cost = self._solve(row, tolerance, limit)
         if count < 0:  # raise, or the lengths were within rounding of the tolerance
             count, outcome, _, cost = self._solve(model.checked("q", row), tolerance, limit)
@@ -187,6 +189,7 @@ def prepare_tasks(
     tolerance: float = 1e-4,
     max_iterations: int = MAX_ITERATIONS,
     restarts: int = RESTARTS,
+    phases: int | None = None,
     seed: int = 0,
 ) -> PreparedTasks:
     """Return `solve_tasks` for many starts and targets: `prepare_tasks(model, tasks)(q)`.
@@ -204,6 +207,9 @@ def prepare_tasks(
         arguments.count("max_iterations", max_iterations, minimum=0),
         arguments.count("restarts", restarts, minimum=0),
         arguments.integer("seed", seed, minimum=0),
+        PHASES
+        if phases is None
+        else arguments.integer("phases", phases, minimum=1, below=PHASES + 1),
     )
     if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
         raise ValueError(f"tasks: expected a list of at least one task, got {shown(tasks)}")
@@ -219,6 +225,7 @@ def solve_tasks(
     tolerance: float = 1e-4,
     max_iterations: int = MAX_ITERATIONS,
     restarts: int = RESTARTS,
+    phases: int | None = None,
     seed: int = 0,
 ) -> TaskSolution:
     """Return coordinates within the limits that meet the exact tasks, near the others' minimum.
@@ -232,6 +239,8 @@ def solve_tasks(
             approach to the others.
         restarts: number of further attempts from random configurations, until the exact tasks are
             met.
+        phases: starts tried beside the random ones, at most, as in `solve_ik`, 1 to 8; by default
+            all.
         seed: of the configurations.
 
     Raises:
@@ -239,7 +248,7 @@ def solve_tasks(
     """
     solve = prepare_tasks(
         model, tasks, tolerance=tolerance, max_iterations=max_iterations, restarts=restarts,
-        seed=seed,
+        phases=phases, seed=seed,
     )  # fmt: skip
     outcome = solve(q)
     return TaskSolution(solve.coordinates, solve.errors, solve.cost, solve.iterations, outcome)

@@ -112,12 +112,14 @@ def prepare_task(
     task: RobotTask,
     tolerance: float,
     restarts: int = 0,
+    phases: int | None = None,
     prepared: bool = True,
 ) -> Callable[[TaskRequest], Solve]:
     """Return the solver of a task, set up for an arm."""
     arm, base = urdf.parse(robot.text), first_link(evaluator_of(robot.name))
     # of an entry of a residual, so that its three keep it together
-    settings: dict[str, Any] = {"tolerance": tolerance / 3.0**0.5, "restarts": restarts}
+    settings: dict[str, Any] = {"restarts": restarts, "phases": phases}
+    settings["tolerance"] = tolerance / 3.0**0.5
 
     def make_solve(request: TaskRequest) -> Solve:
         goal = tasks.configuration(arm.articulation, request.goal)
