@@ -21,7 +21,7 @@ from ..articulation import Articulation, clamp_joint, normalise_start
 from ..backend.compiled import PythonKernel
 from .bounded_step import TaskSystem, damped_step, new_system, take_step
 from .chain import POSITION_ROUNDING
-from .levenberg_marquardt import DAMPING_OF_POSES
+from .levenberg_marquardt import DAMPING_OF_TASKS
 from .linear_algebra import clear, inner
 from .mechanism import (
     EFFECTOR,
@@ -160,7 +160,7 @@ def criteria_of(state, tolerance, limit):
 def meet(state, _target):
     """Make an iteration of Levenberg-Marquardt for the exact tasks, evaluated before."""
     set_scale(state, 1.0, 0.0)
-    step(state, DAMPING_OF_POSES * square_of(state, state.current, True))
+    step(state, DAMPING_OF_TASKS * square_of(state, state.current, True))
 
 
 def attempt_error(state, _target):
