@@ -102,10 +102,17 @@ def prepare(
 
 
 def random_poses(articulation: Articulation, count: int, seed: int) -> FloatArray:
-    """Return coordinates of restarts, the first the same for any count, (count, coordinate)."""
-    rng = np.random.default_rng(seed)
-    blocks = [articulation.random(rng, BLOCK) for _ in range(-(-count // BLOCK))]
-    return np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:count]
+    """Return coordinates of restarts, the first the same for any count, (count, coordinate).
+
+    The articulation keeps the last.
+    """
+    key, poses = articulation.mechanisms.get("restarts", (None, None))
+    if key != (count, seed):
+        rng = np.random.default_rng(seed)
+        blocks = [articulation.random(rng, BLOCK) for _ in range(-(-count // BLOCK))]
+        poses = np.concatenate([*blocks, np.empty((0, articulation.coordinate_count))])[:count]
+        articulation.mechanisms["restarts"] = (count, seed), poses
+    return poses
 
 
 def further_shares(joints: int) -> FloatArray:

@@ -14,6 +14,7 @@ from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import Model, checked_model, effector_of
 from ..outcome import Outcome
+from ..quaternion import made_unit
 from ..rotation import unit
 from .descent import (
     DescentOperations,
@@ -160,7 +161,9 @@ class PreparedTasks(threading.local):
         if rotation is not None:
             if not records["has_rotation"][t]:
                 raise ValueError(f"rotation: expected None for task {t}, got {shown(rotation)}")
-            records["rotation"][t] = unit("rotation", arguments.floats("rotation", rotation, 4))
+            numbers = arguments.floats("rotation", rotation, 4)
+            Q, is_unit = made_unit(numbers.tolist())
+            records["rotation"][t] = Q if is_unit else unit("rotation", numbers)
 
     def _attempt_error(self, state: TaskState, _target: Any) -> tuple[float, ...]:
         """Evaluate all tasks; return the errors of those to meet."""

@@ -88,44 +88,36 @@ def task_arrays(
     model: Articulation, tasks: Sequence[Any], kinds: list[int], factors: list[FloatArray]
 ) -> TaskArrays:
     """Return the arrays of tasks, given their kinds and the factors of their residuals."""
-    count, n, freedoms = len(tasks), model.joint_count, model.freedom_count
-    sizes = [len(row) for row in factors]
+    count, n, freedoms, rows = len(tasks), model.joint_count, model.freedom_count, 0
     terms = max(len(getattr(task, "coefficients", ())) for task in tasks)
+    total = sum(map(len, factors))
     arrays = TaskArrays(
-        np.zeros(count, TASK), np.repeat([task.exact for task in tasks], sizes),
-        np.concatenate(factors), np.zeros((count, n)), np.zeros((count, n, 3)),
-        np.zeros((count, model.coordinate_count)), np.zeros((count, terms)),
-        np.zeros((freedoms, 6)), np.zeros((freedoms, 6)), np.zeros((n, 4)),
+        np.zeros(count, TASK), np.zeros(total, dtype=bool), np.zeros(total), np.zeros((count, n)),
+        np.zeros((count, n, 3)), np.zeros((count, model.coordinate_count)),
+        np.zeros((count, terms)), np.zeros((freedoms, 6)), np.zeros((freedoms, 6)),
+        np.zeros((n, 4)),
     )  # fmt: skip
-    records = arrays.records
-    records["kind"], records["size"], records["row"] = kinds, sizes, np.cumsum(sizes) - sizes
-    records["weight"] = [task.weight for task in tasks]
-    records["exact"] = [task.exact for task in tasks]
     for t, task in enumerate(tasks):
-        if kinds[t] != OWN:
-            for name, attribute in vars(task).items():
-                store_attribute(model, arrays, t, name, attribute)
+        record, size = arrays.records[t], len(factors[t])
+        record["kind"], record["row"], record["size"] = kinds[t], rows, size
+        record["weight"], record["exact"] = task.weight, task.exact
+        arrays.exact[rows : rows + size] = task.exact
+        arrays.factors[rows : rows + size] = factors[t]
+        rows += size
+        for name, attribute in vars(task).items() if kinds[t] != OWN else ():
+            if name in JOINTS:
+                is_world = attribute is None and name in JOINTS[2:]
+                record[name] = -1 if is_world else model.index(attribute, name)
+            elif name in NEUTRAL:
+                record[f"has_{name}"] = attribute is not None
+                record[name] = NEUTRAL[name] if attribute is None else attribute
+            elif name == "coordinates":
+                arrays.coordinates[t] = model.checked(name, attribute)
+            elif name in ("masses", "centres", "coefficients"):
+                getattr(arrays, name)[t, : len(attribute)] = attribute
+            elif name != "axes":
+                record[name] = attribute
     return arrays
-
-
-def store_attribute(
-    model: Articulation, arrays: TaskArrays, t: int, name: str, attribute: Any
-) -> None:
-    """Write an attribute of a task to its record, or to its row of an array."""
-    record = arrays.records[t]
-    if name in JOINTS:
-        record[name] = (
-            -1 if attribute is None and name in JOINTS[2:] else model.index(attribute, name)
-        )
-    elif name in NEUTRAL:
-        record[f"has_{name}"] = attribute is not None
-        record[name] = NEUTRAL[name] if attribute is None else attribute
-    elif name in (TASK.names or ()):
-        record[name] = attribute
-    elif name == "coordinates":
-        arrays.coordinates[t] = model.checked(name, attribute)
-    elif name in TaskArrays._fields:
-        getattr(arrays, name)[t, : len(attribute)] = attribute
 
 
 def evaluate_tasks(state, evaluation):
