@@ -1,5 +1,6 @@
 """From an articulation and its effectors to the mechanism that the solvers work on."""
 
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -115,6 +116,7 @@ def random_poses(articulation: Articulation, count: int, seed: int) -> FloatArra
     return poses
 
 
+@functools.cache
 def further_shares(joints: int) -> FloatArray:
     """Return the shares of the joints' ranges at further starts, (FURTHER_STARTS, joint).
 
