@@ -109,8 +109,8 @@ def _finite_result(method: Callable[..., Any]) -> Callable[..., Any]:
 class Objective:
     """g of a step, in SI units.
 
-    Where g, its derivatives or its quadratic form overflow, methods raise a FloatingPointError; an
-    iterate reports overflow in `finite`. Positions of another shape or not finite are a ValueError.
+    Where g or its derivatives overflow, methods raise a FloatingPointError; an iterate reports
+    overflow in `finite`. Positions of another shape or not finite are a ValueError.
 
     Attributes:
         system: particles and springs.
@@ -239,28 +239,6 @@ class Objective:
         pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
         return self.system.with_separate_dampers.free_incidence @ pulls
 
-    @_finite_result
-    def quadratic_form(self, positions: ArrayLike, d: ArrayLike) -> float:
-        """Return g as a quadratic form in x for constant rest vectors d, shape (spring, 3).
-
-        The form is 1/2 x' (M + h² L) x - h² x' J d - x' (M y + h² f_ext) + constant (Liu et al.
-        2013), with L and J of the effective springs. It equals g(x) for d = rest_vectors(x). It is
-        larger for any other d of the effective rest lengths, or of shorter lengths in tension-only
-        springs.
-        """
-        x, y, hh = self._positions(positions), self.y, self.h * self.h
-        d = coordinates("d", d, len(self.effective.springs), 3)
-        M = scipy.sparse.diags_array(self.system.masses)
-        _, _, L, J = mass_spring.derivation(self.effective)
-        stored = 0.5 * np.sum(self.effective.stiffnesses[:, None] * d**2) + self._constant
-        constant = 0.5 * np.sum(y * (M @ y)) + hh * stored
-        linear = hh * (J @ d) + M @ y + hh * self.external
-        return float(0.5 * np.sum(x * ((M + hh * L) @ x)) - np.sum(x * linear) + constant)
-
-    def rest_vectors(self, positions: ArrayLike) -> FloatArray:
-        """Return the optimal d of the effective springs at x, shape (spring, 3) [m]."""
-        return mass_spring.rest_vectors(self.effective, positions)
-
     def _positions(self, positions: ArrayLike) -> FloatArray:
         return coordinates("positions", positions, self.system.particle_count, 3)
 
@@ -268,8 +246,8 @@ class Objective:
 def global_matrix(system: mass_spring.MassSpring, h: float) -> Any:
     """Return M + h² L of the effective springs [kg], sparse (particle, particle).
 
-    This is the Hessian of the quadratic form of g for constant d, the same for each coordinate and
-    for all steps of length h. The rows and columns of pins are the identity's.
+    This is the Hessian of g for constant directions of the springs (Liu et al. 2013), the same for
+    each coordinate and all steps of length h. The rows and columns of pins are the identity's.
     """
     weights = h * h * effective_stiffnesses(system, h)
     return system.free_blocks.scalar_matrix(weights, system.free_masses)
