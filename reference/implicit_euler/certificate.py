@@ -23,8 +23,7 @@ from numpy.typing import ArrayLike
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
 from ..mass_spring import lengths
 from ..outcome import SentenceEnum
-from ..sparse import NotPositiveDefiniteError
-from ..sparse.linear_solver import Factor, factorize
+from ..sparse import CholeskyFactor, NotPositiveDefiniteError
 from .objective import Objective
 
 EPS = float(np.finfo(float).eps)
@@ -161,7 +160,7 @@ def kantorovich_distance(eta: float, ratio: float) -> float:
     return 2.0 * eta / (1.0 + math.sqrt(1.0 - 2.0 * ratio))
 
 
-def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
+def least_curvature(H: Any, error: float) -> tuple[float, CholeskyFactor | None]:
     """Return a positive lower bound of the smallest eigenvalue and the factor of H, or 0 and None.
 
     The bound holds for every matrix within `error` of H in norm. Lanczos estimates the eigenvalue.
@@ -171,7 +170,7 @@ def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
     n = H.shape[0]
     allowance = error + (n + GRADIENT_ROUNDING) * EPS * float(H.trace())
     try:
-        factor = factorize(H)
+        factor = CholeskyFactor(H)
         shift = FIRST_SHIFT * _estimate_smallest_eigenvalue(factor, n)
         while shift > allowance:
             with contextlib.suppress(NotPositiveDefiniteError):
@@ -184,7 +183,7 @@ def least_curvature(H: Any, error: float) -> tuple[float, Factor | None]:
 
 
 def newton_length(
-    H: Any, factor: Factor, gradient: FloatArray, mu: float, errors: "RoundingErrors"
+    H: Any, factor: CholeskyFactor, gradient: FloatArray, mu: float, errors: "RoundingErrors"
 ) -> float:
     """Return an upper bound of |H^-1 grad g| [m], namely |p| + |grad g + H p| / mu."""
     p = -factor.solve(gradient)
@@ -270,7 +269,7 @@ def _rest_length_terms(objective: Objective) -> FloatArray:
     return objective.system.with_separate_dampers.rest_lengths + objective.effective.rest_lengths
 
 
-def _estimate_smallest_eigenvalue(factor: Factor, n: int) -> float:
+def _estimate_smallest_eigenvalue(factor: CholeskyFactor, n: int) -> float:
     """Return an estimate from above of the smallest eigenvalue, by Lanczos with the inverse."""
     inverse = scipy.sparse.linalg.LinearOperator((n, n), matvec=factor.solve, dtype=float)
     start = np.random.default_rng(n).standard_normal(n)

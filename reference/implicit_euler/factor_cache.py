@@ -12,13 +12,12 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from ..mass_spring import MassSpring
-from ..sparse import NotPositiveDefiniteError
-from ..sparse.linear_solver import Factor, factorize
+from ..sparse import CholeskyFactor, NotPositiveDefiniteError
 from .objective import effective_stiffnesses, global_matrix
 
 # Factors by the digest of their matrix and by the digest of its sparsity pattern.
-_by_matrix: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
-_by_pattern: WeakValueDictionary[bytes, Factor] = WeakValueDictionary()
+_by_matrix: WeakValueDictionary[bytes, CholeskyFactor] = WeakValueDictionary()
+_by_pattern: WeakValueDictionary[bytes, CholeskyFactor] = WeakValueDictionary()
 
 
 class GlobalMatrixSolver:
@@ -28,7 +27,7 @@ class GlobalMatrixSolver:
         self._factor = global_factor(system, h)
 
 
-def global_factor(system: MassSpring, h: float) -> Factor:
+def global_factor(system: MassSpring, h: float) -> CholeskyFactor:
     """Return the factor of M + h² L; an error if masses are too small beside h² k."""
     try:
         return prefactored(global_matrix(system, h))
@@ -40,7 +39,7 @@ def global_factor(system: MassSpring, h: float) -> Factor:
         ) from None
 
 
-def hessian_factor(system: MassSpring) -> Factor:
+def hessian_factor(system: MassSpring) -> CholeskyFactor:
     """Return the factor of M stored in the sparsity pattern of the Hessian of g."""
     springs = system.with_separate_dampers.free_blocks
     M = springs.matrix(np.zeros((len(system.with_separate_dampers.springs), 3, 3)))
@@ -48,7 +47,7 @@ def hessian_factor(system: MassSpring) -> Factor:
     return prefactored(M)
 
 
-def prefactored(matrix: Any) -> Factor:
+def prefactored(matrix: Any) -> CholeskyFactor:
     """Return the factor of a sparse CSC matrix from the cache, or factorise the matrix."""
     digest = hashlib.blake2b(matrix.indptr)
     digest.update(matrix.indices)
@@ -57,7 +56,7 @@ def prefactored(matrix: Any) -> Factor:
     factor = _by_matrix.get(digest.digest())
     if factor is None:
         analysed = _by_pattern.get(pattern)
-        factor = factorize(matrix) if analysed is None else analysed.refactorize(matrix)
+        factor = CholeskyFactor(matrix) if analysed is None else analysed.refactorize(matrix)
         _by_matrix[digest.digest()] = _by_pattern[pattern] = factor
     return factor
 

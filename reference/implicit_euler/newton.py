@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..mass_spring import MassSpring
-from ..sparse import NotPositiveDefiniteError
-from ..sparse.linear_solver import Factor
+from ..sparse import CholeskyFactor, NotPositiveDefiniteError
 from .certificate import rounding_errors
 from .factor_cache import hessian_factor
 from .line_search import line_search
@@ -66,7 +65,7 @@ class Newton:
             return True
         return False
 
-    def _factor(self, hessian: Any, shift: float) -> tuple[Factor, float]:
+    def _factor(self, hessian: Any, shift: float) -> tuple[CholeskyFactor, float]:
         """Return the factor of the Hessian plus a multiple of M, and the multiple.
 
         The search starts below the last multiple, which so decays when no longer needed.

@@ -148,11 +148,11 @@ class Objective:
         self.external = system.weights
         if external_forces is not None:
             self.external = mass_spring.constant_forces(system, external_forces)
-        self.effective, self._constant = _effective(system, self.x_n, h)
+        self.effective, constant = _effective(system, self.x_n, h)
         arrays = self.effective.arrays
         particles = self.y, self.external, arrays.masses
         elastic = arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only
-        self._arguments = h, self._constant, particles, arrays.springs, elastic, arrays.pinned
+        self._arguments = h, constant, particles, arrays.springs, elastic, arrays.pinned
         self._floor_coefficients = _rounding_coefficients(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )

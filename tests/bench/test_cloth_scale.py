@@ -64,8 +64,8 @@ def test_progress_is_announced():
 
 @pytest.mark.slow
 def test_a_failure_in_its_process_is_reported():
-    with pytest.raises(RuntimeError, match="ValueError: library"):
-        suite.in_its_own_process(SMALL, "json")
+    with pytest.raises(RuntimeError, match="ValueError: size"):
+        suite.in_its_own_process(1, "scipy")
 
 
 def test_all_cloths_but_the_largest_are_measured_by_scipy_too():
