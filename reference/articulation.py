@@ -81,6 +81,8 @@ JOINT = np.dtype(
     ],
     align=True,
 )
+# The same with the joint's pose.
+POSED = np.dtype([("joint", JOINT), ("position", np.float64, 3), ("rotation", np.float64, 4)])
 
 
 class Mimic(NamedTuple):
@@ -272,7 +274,7 @@ class Articulation(KeepsReadOnly):
         if is_plain(q, (self.coordinate_count,)):  # most often one of many calls: overhead counts
             count = len(self.joints)
             positions, rotations = np.empty((count, 3)), np.empty((count, 4))
-            if forward_one(self.joints, q, positions, rotations):
+            if _forward_single(self.joints, np.empty(len(q)), q, positions, rotations):
                 return positions, rotations
         return self._transforms(_forward, q)
 
@@ -410,6 +412,13 @@ def normalise_start(joints, q):
     return valid
 
 
+def unit_start(joints, q, unit):
+    """Fill coordinates with unit quaternions; return what `normalise_start` does."""
+    for k in range(len(unit)):  # a slice would compile numba's messages about shapes
+        unit[k] = q[k]
+    return normalise_start(joints, unit)
+
+
 def ball_coordinate(joints, j):
     """Return the index in q of the quaternion of a ball or free joint."""
     return joints["coordinate"][j] + (3 if joints["kind"][j] == FREE else 0)
@@ -450,9 +459,7 @@ def _excess_batch(joints, q, excess):
 def _locals_batch(joints, q, offsets, rotations):
     unit = np.empty(q.shape[1])
     for i in range(len(q)):
-        for k in range(len(unit)):  # a slice would compile numba's messages about shapes
-            unit[k] = q[i, k]
-        if not normalise_start(joints, unit):
+        if not unit_start(joints, q[i], unit):
             return False
         for j in range(len(joints)):
             x, R = joint_transform(joints, j, unit)
@@ -461,9 +468,8 @@ def _locals_batch(joints, q, offsets, rotations):
     return True
 
 
-def _forward_one(joints, q, positions, rotations):
-    unit = q.copy()
-    if not normalise_start(joints, unit):
+def _forward_one(joints, unit, q, positions, rotations):
+    if not unit_start(joints, q, unit):
         return False
     articulated_pose(joints, unit, positions, rotations)
     return True
@@ -472,19 +478,24 @@ def _forward_one(joints, q, positions, rotations):
 def _forward_batch(joints, q, positions, rotations):
     unit = np.empty(q.shape[1])
     for i in range(len(q)):
-        for k in range(len(unit)):
-            unit[k] = q[i, k]
-        if not normalise_start(joints, unit):
+        if not _forward_one(joints, unit, q[i], positions[i], rotations[i]):
             return False
-        articulated_pose(joints, unit, positions[i], rotations[i])
     return True
+
+
+def _forward_of_posed(unit, table, q):
+    posed = table.view(POSED)
+    return q.shape == unit.shape and _forward_one(
+        posed["joint"], unit, q, posed["position"], posed["rotation"]
+    )
 
 
 _clamp = Kernel(_clamp_batch)
 _excess = Kernel(_excess_batch)
 _locals = Kernel(_locals_batch)
 _forward = Kernel(_forward_batch, label="forward_kinematics of a batch of articulations")
-forward_one = Kernel(_forward_one, label="forward_kinematics of articulations")
+_forward_single = Kernel(_forward_one, label="forward_kinematics of articulations", nogil=False)
+forward_posed = Kernel(_forward_of_posed, label="prepared forward_kinematics of articulations")
 
 
 def _per_joint(name: str, values: FloatArray, count: int, *axes: int) -> FloatArray:
