@@ -88,6 +88,18 @@ def is_plain(values: Any, shape: tuple[int, ...]) -> bool:
     )
 
 
+def output(name: str, value: Any, lengths: tuple[int, ...]) -> FloatArray:
+    """Return an array for results: a new array for None, else the value if kernels can fill it."""
+    if value is None or is_plain(value, lengths):
+        return np.empty(lengths) if value is None else value
+    got = shown(value)
+    if isinstance(value, np.ndarray):
+        access, kind = "" if value.flags.writeable else "read-only ", type(value).__name__
+        got = f"a {access}{kind} of {value.dtype}, {shape(value.shape)}, strides {value.strides}"
+    expected = f"a writable, C-contiguous float64 array of shape {shape(lengths)}"
+    raise ValueError(f"{name}: expected {expected}, got {got}")
+
+
 def number(
     name: str, value: Any, *, minimum: float = -LARGEST_COORDINATE, above: float = -np.inf
 ) -> float:

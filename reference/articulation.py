@@ -49,7 +49,7 @@ from .quaternion import (
     store_quaternion_to,
     store_vector,
 )
-from .skeleton import Skeleton, checked_skeleton
+from .skeleton import POSE_FIELDS, PoseArrays, Skeleton, checked_skeleton, pose_arrays
 
 # The kinds of joints, by their numbers in kernels.
 KINDS = "fixed", "hinge", "slide", "ball", "free"
@@ -82,7 +82,7 @@ JOINT = np.dtype(
     align=True,
 )
 # The same with the joint's pose.
-POSED = np.dtype([("joint", JOINT), ("position", np.float64, 3), ("rotation", np.float64, 4)])
+POSED = np.dtype([("joint", JOINT), *POSE_FIELDS])
 
 
 class Mimic(NamedTuple):
@@ -269,24 +269,24 @@ class Articulation(KeepsReadOnly):
         """Return positions (..., joint, 3) [m] and rotations (..., joint, 4) in parents' frames."""
         return self._transforms(_locals, q)
 
-    def forward(self, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4)."""
-        if is_plain(q, (self.coordinate_count,)):  # most often one of many calls: overhead counts
-            count = len(self.joints)
+    def forward(self, q: ArrayLike, out: PoseArrays = None) -> tuple[FloatArray, FloatArray]:
+        """Return global positions (..., joint, 3) [m] and rotations (..., joint, 4), in `out`."""
+        if out is None and is_plain(q, (self.coordinate_count,)):  # often one of many short calls
+            count, unit = len(self.joints), np.empty(self.coordinate_count)
             positions, rotations = np.empty((count, 3)), np.empty((count, 4))
-            if _forward_single(self.joints, np.empty(len(q)), q, positions, rotations):
+            if _forward_single(self.joints, unit, q, positions, rotations):
                 return positions, rotations
-        return self._transforms(_forward, q)
+        return self._transforms(_forward, q, out)
 
-    def _transforms(self, kernel: Kernel, q: ArrayLike) -> tuple[FloatArray, FloatArray]:
+    def _transforms(
+        self, kernel: Kernel, q: ArrayLike, out: PoseArrays = None
+    ) -> tuple[FloatArray, FloatArray]:
         q = arguments.floats("q", q, "...", self.coordinate_count)
-        shape = (*q.shape[:-1], self.joint_count)
-        positions, rotations = np.empty((*shape, 3)), np.empty((*shape, 4))
-        rows = one_batch(q), one_batch(positions, 2), one_batch(rotations, 2)
-        if kernel(self.joints, *rows):
+        q, positions, rotations = pose_arrays(out, q, *q.shape[:-1], self.joint_count)
+        if kernel(self.joints, one_batch(q), one_batch(positions, 2), one_batch(rotations, 2)):
             return positions, rotations
         # raise, or the lengths were within rounding of the tolerance
-        return self._transforms(kernel, self.checked("q", q))
+        return self._transforms(kernel, self.checked("q", q), out)
 
     def checked(self, name: str, q: ArrayLike) -> FloatArray:
         """Return coordinates (..., coordinate), their quaternions made unit."""
@@ -476,17 +476,18 @@ def _forward_one(joints, unit, q, positions, rotations):
 
 
 def _forward_batch(joints, q, positions, rotations):
-    unit = np.empty(q.shape[1])
+    unit, valid = np.empty(q.shape[1]), True
     for i in range(len(q)):
-        if not _forward_one(joints, unit, q[i], positions[i], rotations[i]):
-            return False
-    return True
+        valid &= _forward_one(joints, unit, q[i], positions[i], rotations[i])
+    return valid
 
 
 def _forward_of_posed(unit, table, q):
     posed = table.view(POSED)
-    return q.shape == unit.shape and _forward_one(
-        posed["joint"], unit, q, posed["position"], posed["rotation"]
+    return (
+        q.dtype == table.dtype
+        and q.shape == unit.shape
+        and _forward_one(posed["joint"], unit, q, posed["position"], posed["rotation"])
     )
 
 

@@ -26,20 +26,28 @@ from .backend.simd.vectors import (
 from .backend.threads import in_slices
 from .model import Model, checked_model, coordinates_name
 from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
-from .skeleton import Pose, Skeleton, SkeletonArrays, checked_skeleton
+from .skeleton import (
+    POSE_FIELDS,
+    Pose,
+    PoseArrays,
+    Skeleton,
+    SkeletonArrays,
+    checked_skeleton,
+    pose_arrays,
+)
 
-# A link of a skeleton with its pose, for kernels.
-LINK = np.dtype(
-    [("parent", np.int64), ("offset", np.float64, 3), ("position", np.float64, 3),
-     ("rotation", np.float64, 4)]
-)  # fmt: skip
-# Every float64 array of two axes converts to the type of this array, which no pose has the shape of.
+# A joint of a skeleton with its unit local rotation and its pose, for kernels.
+TREE_FIELDS = [("parent", np.int64), ("offset", np.float64, 3)]
+LINK = np.dtype([*TREE_FIELDS, ("unit", np.float64, 4), *POSE_FIELDS])
+# All float64 arrays of two axes convert to its type in calls of kernels. No pose has its shape.
 STRIDED = frozen(np.zeros((2, 2))[:, ::-1])
 # A slice of a batch with fewer joints than this takes less time than another thread to begin.
 THREAD_JOINTS = 100_000
 
 
-def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
+def forward_kinematics(
+    skeleton: Model, local_rotations: ArrayLike, *, out: PoseArrays = None
+) -> Pose:
     """Return the global pose of every joint, read-only: (..., joint, 3) [m] and (..., joint, 4).
 
     A joint with parent p has the rotation R = R_p Q and the position x = x_p + R_p offset. The
@@ -51,35 +59,38 @@ def forward_kinematics(skeleton: Model, local_rotations: ArrayLike) -> Pose:
         local_rotations: unit quaternions relative to the parent, w first, shape (..., joint, 4);
             leading axes are batch or frame. For an Articulation, its coordinates (...,
             coordinate).
+        out: a Pose, or a pair of C-contiguous float64 arrays, to be filled and returned, writable;
+            may overlap `local_rotations`. Large batches take less time than in new memory.
 
     Raises:
-        ValueError: if the shape is another, or a quaternion is not finite or further than 1e-6
-            from unit length.
+        ValueError: if a shape is another, `out` cannot be filled, or a quaternion is not finite or
+            further than 1e-6 from unit length. The contents of `out` are then not defined.
     """
-    positions: Any
-    rotations: Any
-    if isinstance(skeleton, Articulation):
-        positions, rotations = skeleton.forward(local_rotations)
+    if not isinstance(skeleton, Skeleton):
+        model: Any = checked_model(skeleton)
+        positions, rotations = model.forward(local_rotations, out)
+    else:
+        positions, rotations = _skeleton_pose(skeleton, local_rotations, out)
+    if out is None:
         positions.setflags(False)  # by its name it takes twice as long
         rotations.setflags(False)
-        return Pose(positions, rotations)
-    if not isinstance(skeleton, Skeleton):
-        return forward_kinematics(checked_model(skeleton), local_rotations)
+    return Pose(positions, rotations)
+
+
+def _skeleton_pose(skeleton: Skeleton, local: Any, out: PoseArrays) -> tuple[Any, Any]:
     tree = skeleton.arrays
     count = len(tree.parents)
-    if is_plain(local_rotations, (count, 4)):  # most often one of many calls: overhead counts
-        local: Any = local_rotations
+    if out is None and is_plain(local, (count, 4)):  # often one of many short calls
         positions, rotations = np.empty((count, 3)), np.empty((count, 4))
         valid = _forward(*tree, local, positions, rotations)
     else:
-        local = arguments.floats("local_rotations", local_rotations, "...", count, 4)
-        positions, rotations = np.empty((*local.shape[:-1], 3)), np.empty(local.shape)
+        local = arguments.floats("local_rotations", local, "...", count, 4)
+        local, positions, rotations = pose_arrays(out, local, *local.shape[:-1])
         valid = _in_slices(_forward_batch, tree, local, positions, rotations)
-    if not valid:  # raise, or the lengths were within rounding of the tolerance
-        return forward_kinematics(skeleton, rotation.unit("local_rotations", local))
-    positions.setflags(False)
-    rotations.setflags(False)
-    return Pose(positions, rotations)
+    if valid:
+        return positions, rotations
+    # raise, or the lengths were within rounding of the tolerance
+    return _skeleton_pose(skeleton, rotation.unit("local_rotations", local), out)
 
 
 class PreparedKinematics(threading.local):
@@ -96,6 +107,7 @@ class PreparedKinematics(threading.local):
 
     def __init__(self, model: Skeleton | Articulation):
         """Allocate the arrays of a thread; `prepare` checks the argument."""
+        self._shape: tuple[int, ...]
         if isinstance(model, Skeleton):
             joints, self._shape = np.zeros(model.joint_count, LINK), (model.joint_count, 4)
             joints["parent"], joints["offset"] = model.arrays
@@ -129,7 +141,7 @@ class PreparedKinematics(threading.local):
             try:
                 if forward(table, local_rotations):
                     return pose
-            except TypeError:  # which takes so long that the next call looks first
+            except TypeError:  # takes so long that later calls look first
                 self._work = functools.partial(_if_plain, forward, self._shape), table, pose
         name = coordinates_name(self._model)
         local = arguments.floats(name, local_rotations, *self._shape)
@@ -137,8 +149,8 @@ class PreparedKinematics(threading.local):
         return self.pose
 
 
-def _if_plain(kernel: Kernel, shape: tuple[int, ...], table: FloatArray, local: Any) -> bool:
-    return is_plain(local, shape) and kernel(table, local)
+def _if_plain(kernel: Any, shape: tuple[int, ...], table: FloatArray, q: Any) -> bool:
+    return is_plain(q, shape) and kernel(table, q)
 
 
 def prepare(skeleton: Model) -> PreparedKinematics:
@@ -152,16 +164,21 @@ def prepare(skeleton: Model) -> PreparedKinematics:
     return PreparedKinematics(checked_model(skeleton))
 
 
-def local_from_global(skeleton: Skeleton, rotations: ArrayLike) -> FloatArray:
+def local_from_global(
+    skeleton: Skeleton, rotations: ArrayLike, *, out: FloatArray | None = None
+) -> FloatArray:
     """Return local rotations, (..., joint, 4), of global rotations: Q = R_parent* R.
 
-    The root's are R. Errors are as for `forward_kinematics`.
+    The root's are R. An array `out` is filled and returned. Errors are as for
+    `forward_kinematics`.
     """
     tree = checked_skeleton(skeleton).arrays
     poses = arguments.floats("rotations", rotations, "...", len(tree.parents), 4)
-    local = np.empty(poses.shape)
+    local = arguments.output("out", out, poses.shape)
+    if np.may_share_memory(local, poses):
+        poses = poses.copy()
     if not _in_slices(_local_batch, tree, poses, local):
-        return local_from_global(skeleton, rotation.unit("rotations", poses))
+        return local_from_global(skeleton, rotation.unit("rotations", poses), out=out)
     return local
 
 
@@ -191,11 +208,11 @@ def forward_pose(parents, offsets, local, positions, rotations):
 
 
 def local_pose(parents, rotations, local):
-    """Fill local rotations (joint, 4) of a pose from global unit quaternions."""
-    store_rotation(local, 0, load_unit(rotations, 0))
-    for j in range(1, len(parents)):
+    """Fill local rotations (joint, 4) of a pose from global unit quaternions, in place too."""
+    for j in range(len(parents) - 1, 0, -1):
         R_parent = load_unit(rotations, parents[j])
         store_rotation(local, j, multiply(conjugate(R_parent), load_unit(rotations, j)))
+    store_rotation(local, 0, load_unit(rotations, 0))
 
 
 def normalise(rotations, unit):
@@ -221,9 +238,12 @@ def _forward_one(parents, offsets, pose, positions, rotations):
 
 def _forward_of_links(table, local):
     links = table.view(LINK)
-    return local.shape == (len(links), 4) and _forward_one(
-        links["parent"], links["offset"], local, links["position"], links["rotation"]
-    )
+    fits = local.dtype == table.dtype and local.shape == (len(links), 4)
+    if not fits or not normalise(local, links["unit"]):  # `local` may be a view of the last pose
+        return False
+    tree, pose = (links["parent"], links["offset"]), (links["position"], links["rotation"])
+    forward_pose(*tree, links["unit"], *pose)
+    return True
 
 
 def _forward_many(parents, offsets, poses, positions, rotations):
@@ -244,12 +264,11 @@ def _forward_many(parents, offsets, poses, positions, rotations):
 
 def _local_many(parents, offsets, poses, local):
     if len(poses) < LANES:
-        unit = np.empty(poses.shape[1:])
+        valid = True
         for i in range(len(poses)):
-            if not normalise(poses[i], unit):
-                return False
-            local_pose(parents, unit, local[i])
-        return True
+            valid &= normalise(poses[i], local[i])
+            local_pose(parents, local[i], local[i])
+        return valid
     rotations = np.empty((len(parents), 4, LANES))
     for i in range(0, len(poses), LANES):
         first = min(i, len(poses) - LANES)

@@ -3,7 +3,7 @@
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -125,6 +125,31 @@ class Pose(NamedTuple):
 
     positions: FloatArray
     rotations: FloatArray
+
+
+PoseArrays: TypeAlias = tuple[FloatArray | None, FloatArray | None] | None
+# A pose in the records of joints, for kernels.
+POSE_FIELDS = [("position", np.float64, 3), ("rotation", np.float64, 4)]
+
+
+def pose_arrays(
+    out: PoseArrays, q: FloatArray, *shape: int
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return q and arrays for positions, (*shape, 3), and rotations, (*shape, 4).
+
+    They are those of `out`, new ones for None; q in their memory is copied.
+    """
+    if out is None:
+        return q, np.empty((*shape, 3)), np.empty((*shape, 4))
+    if not isinstance(out, tuple | list) or len(out) != 2:
+        raise ValueError(f"out: expected a Pose or a pair of arrays, got {shown(out)}")
+    positions = arguments.output("out.positions", out[0], (*shape, 3))
+    rotations = arguments.output("out.rotations", out[1], (*shape, 4))
+    if np.may_share_memory(positions, rotations):
+        raise ValueError("out: expected two arrays, got arrays that share memory")
+    if np.may_share_memory(q, positions) or np.may_share_memory(q, rotations):
+        q = q.copy()
+    return q, positions, rotations
 
 
 def _checked_tree(parents: ArrayLike, offsets: ArrayLike) -> tuple[IndexArray, FloatArray]:
