@@ -496,7 +496,9 @@ _excess = Kernel(_excess_batch)
 _locals = Kernel(_locals_batch)
 _forward = Kernel(_forward_batch, label="forward_kinematics of a batch of articulations")
 _forward_single = Kernel(_forward_one, label="forward_kinematics of articulations", nogil=False)
-forward_posed = Kernel(_forward_of_posed, label="prepared forward_kinematics of articulations")
+forward_posed = Kernel(
+    _forward_of_posed, label="prepared forward_kinematics of articulations", nogil=False
+)
 
 
 def _per_joint(name: str, values: FloatArray, count: int, *axes: int) -> FloatArray:

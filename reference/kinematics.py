@@ -26,15 +26,7 @@ from .backend.simd.vectors import (
 from .backend.threads import in_slices
 from .model import Model, checked_model, coordinates_name
 from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
-from .skeleton import (
-    POSE_FIELDS,
-    Pose,
-    PoseArrays,
-    Skeleton,
-    SkeletonArrays,
-    checked_skeleton,
-    pose_arrays,
-)
+from .skeleton import POSE_FIELDS, Pose, PoseArrays, Skeleton, checked_skeleton, pose_arrays
 
 # A joint of a skeleton with its unit local rotation and its pose, for kernels.
 TREE_FIELDS = [("parent", np.int64), ("offset", np.float64, 3)]
@@ -182,15 +174,12 @@ def local_from_global(
     return local
 
 
-def _in_slices(kernel: Kernel, tree: SkeletonArrays, *poses: FloatArray) -> bool:
+def _in_slices(kernel: Kernel, tree: tuple[Any, Any], *poses: FloatArray) -> bool:
     """Run a kernel on slices of arrays (..., joint, 3 or 4); return whether all were valid."""
     flat = [values.reshape(-1, *values.shape[-2:]) for values in poses]
-    length = math.ceil(THREAD_JOINTS / len(tree.parents))
-
-    def arguments_of(part: slice) -> tuple[Any, ...]:
-        return (*tree, *(values[part] for values in flat))
-
-    return all(in_slices(kernel, len(flat[0]), arguments_of, minimum=length))
+    length = math.ceil(THREAD_JOINTS / len(tree[0]))
+    part_of = lambda part: (*tree, *(values[part] for values in flat))  # noqa: E731
+    return all(in_slices(kernel, len(flat[0]), part_of, minimum=length))
 
 
 def forward_pose(parents, offsets, local, positions, rotations):

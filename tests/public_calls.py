@@ -221,7 +221,7 @@ def values():
             "tolerance_rotation": 1e-4, "max_iterations": 8, "restarts": 1, "seed": 3,
             "record": True, "phases": 1, "prefer": None, "oriented": False, "target": point,
             "solver": "levenberg_marquardt", "position": point, "rotation": quaternions[0],
-            "weight": 2.0, "tasks": [Target(point, effector=5)], "task": 0,
+            "weight": 2.0, "tasks": [Target(point, effector=5)], "task": 0, "out": None,
             "curve": forces, "start": local[0], "warm": True, "closed": False, "pose": local[0],
             "count": 12, "min_spacing": 0.01, "max_spacing": 0.05, "masses": masses,
             "springs": SPRINGS, **per_spring, "pinned": np.array([0]), "gravity": gravity,

@@ -1,7 +1,10 @@
+import pickle
+
 import numpy as np
 import pytest
 
 from plumbob.reference import (
+    Pose,
     forward_kinematics,
     kinematics,
     local_from_global,
@@ -9,6 +12,7 @@ from plumbob.reference import (
     rotation,
     set_num_threads,
 )
+from plumbob.reference.arguments import frozen
 from plumbob.reference.backend import compiled
 from plumbob.reference.backend.simd.vectors import LANES
 
@@ -90,11 +94,106 @@ def test_prepared_kinematics_fill_the_same_arrays_with_the_same_bits(skeleton, r
         assert not any(values.flags.writeable for values in pose)
     bad = np.array(local, float)
     bad[-1] *= 1.01
-    for wrong, words in ((bad, "length 1.01"), (bad[:-1], "shape"), ("x", "numbers")):
+    masked = np.ma.masked_greater(local, 0.5)
+    for wrong, words in ((bad, "length 1.01"), (bad[:-1], "shape"), (bad[None], "shape"),
+                         ("x", "numbers"), (masked, "masked")):  # fmt: skip
         with pytest.raises(ValueError, match=f"^local_rotations: expected .*{words}"):
             forward(wrong)
     with pytest.raises(ValueError, match=r"^skeleton: "):
         prepare(local)
+
+
+FORMS = {
+    "list": lambda x: x.tolist(),
+    "float32": lambda x: x.astype(np.float32),
+    "other byte order": lambda x: x.astype(x.dtype.newbyteorder()),
+    "read-only": frozen,
+    "strided": lambda x: np.repeat(x, 2, axis=-1)[..., ::2],
+    "columns": np.asfortranarray,
+    "another process": lambda x: pickle.loads(pickle.dumps(x)),
+}
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_prepared_kinematics_take_arrays_of_any_form(skeleton, articulated, rng, form, backend):
+    robot = articulated(["free", "hinge", "slide", "ball", "fixed", "hinge"], 1)
+    for model, q in (
+        (skeleton, rotation.random(rng, skeleton.joint_count)),
+        (robot, robot.random(rng)),
+    ):
+        forward = prepare(model)
+        for values in (FORMS[form](q), q):  # what one call has taken changes no later call
+            expected = forward_kinematics(model, np.array(values, float))
+            assert all(map(np.array_equal, forward(values), expected))
+
+
+def test_prepared_kinematics_take_views_of_their_last_pose(skeleton, local, backend):
+    forward = prepare(skeleton)
+    rotations = forward(local).rotations[::-1]
+    expected = forward_kinematics(skeleton, rotations.copy())
+    assert all(map(np.array_equal, forward(rotations), expected))
+
+
+@pytest.fixture(params=["skeleton", "articulation"])
+def batch(request, skeleton, articulated, rng):
+    """Return a model, coordinates of more poses than lanes, and arrays for their poses."""
+    if request.param == "skeleton":
+        model, q = skeleton, rotation.random(rng, 3, LANES, skeleton.joint_count)
+    else:
+        model = articulated(["free", "hinge", "slide", "ball", "fixed", "hinge"], 1)
+        q = model.random(rng, 3, LANES)
+    shape = 3, LANES, model.joint_count
+    return model, q, Pose(np.full((*shape, 3), np.nan), np.full((*shape, 4), np.nan))
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_poses_in_arrays_of_the_user_have_the_same_bits(batch, threads, monkeypatch, backend):
+    model, q, out = batch
+    expected = forward_kinematics(model, q)
+    monkeypatch.setattr(kinematics, "THREAD_JOINTS", 1)
+    with set_num_threads(threads):
+        pose = forward_kinematics(model, q, out=out)
+    for values, array, right in zip(pose, out, expected, strict=True):
+        assert values is array
+        assert array.flags.writeable
+        np.testing.assert_array_equal(array, right)
+    single = forward_kinematics(model, q[0, 0], out=(out.positions[0, 0], None))
+    np.testing.assert_array_equal(single.positions, out.positions[0, 0])
+    np.testing.assert_array_equal(single.rotations, expected.rotations[0, 0])
+
+
+@pytest.mark.parametrize("count", BATCHES)
+def test_results_may_take_the_place_of_arguments(skeleton, rng, count, backend):
+    """The last tile of a batch would read what an earlier tile wrote."""
+    local = rotation.random(rng, count, skeleton.joint_count)
+    pose = forward_kinematics(skeleton, local)
+    rotations = local.copy()
+    forward_kinematics(skeleton, rotations, out=(None, rotations))
+    np.testing.assert_array_equal(rotations, pose.rotations)
+    expected = local_from_global(skeleton, pose.rotations)
+    assert local_from_global(skeleton, rotations, out=rotations) is rotations
+    np.testing.assert_array_equal(rotations, expected)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda x, R: x, "out: expected a Pose or a pair"),
+        (lambda x, R: (x, R, R), "out: expected a Pose or a pair"),
+        (lambda x, R: (x[:-1], R), r"out.positions: .* got a ndarray of float64, \(2, 8, 6, 3\)"),
+        (lambda x, R: (x[0], R), r"out.positions: .* got a ndarray of float64, \(8, 6, 3\)"),
+        (lambda x, R: (x, R.tolist()), r"out.rotations: .* got \["),
+        (lambda x, R: (x, R.astype(np.float32)), "out.rotations: .* of float32"),
+        (lambda x, R: (x, frozen(R)), "out.rotations: .* got a read-only"),
+        (lambda x, R: (np.asfortranarray(x), R), "out.positions: .* strides"),
+        (lambda x, R: (R.reshape(-1)[: x.size].reshape(x.shape), R), "out: .* share memory"),
+    ],
+)
+def test_arrays_that_cannot_be_filled_are_refused(batch, change, words):
+    model, q, out = batch
+    with pytest.raises(ValueError, match=f"^{words}"):
+        forward_kinematics(model, q, out=change(*out))
+    assert all(np.isnan(values).all() for values in out)
 
 
 def test_prepared_kinematics_of_an_articulation_have_the_same_bits(articulated, rng, backend):

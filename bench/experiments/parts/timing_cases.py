@@ -16,6 +16,7 @@ from plumbob.crosscheck.engines.skeleton_engine import MujocoSkeleton, coordinat
 from plumbob.reference import (
     IK_SOLVERS,
     ImplicitEuler,
+    Pose,
     Skeleton,
     State,
     forward_kinematics,
@@ -109,6 +110,8 @@ def kinematics_cases() -> Iterator[TimedCase]:
             poses = _work("kinematics", name, f"{count:,} poses a call{suffix}")
             prepare = partial(compiled_poses, skeleton, count)
             yield TimedCase(poses, COMPILED, prepare, count, cores=cores)
+            fill = partial(prepared_poses, skeleton, count)
+            yield TimedCase(poses, PREPARED, fill, count, cores=cores)
             for engine in SKELETON_ENGINES if cores else ():
                 loop = partial(engine_poses, engine, skeleton, count)
                 yield TimedCase(poses, engine, loop, count)
@@ -137,9 +140,13 @@ def compiled_poses(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
     return partial(forward_kinematics, skeleton, _local_rotations(skeleton, *batch))
 
 
-def prepared_poses(skeleton: Skeleton) -> Callable[[], Any]:
-    """Return our forward kinematics of a random pose; the result stays in its own arrays."""
-    return partial(prepare(skeleton), _local_rotations(skeleton))
+def prepared_poses(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
+    """Return our forward kinematics of random poses, which fills the same arrays every time."""
+    local = _local_rotations(skeleton, *batch)
+    if not batch:
+        return partial(prepare(skeleton), local)
+    out = Pose(*map(np.copy, forward_kinematics(skeleton, local)))
+    return partial(forward_kinematics, skeleton, local, out=out)
 
 
 def engine_poses(name: str, skeleton: Skeleton, *batch: int) -> Callable[[], Any]:

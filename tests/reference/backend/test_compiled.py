@@ -285,6 +285,17 @@ def test_the_cache_on_disk_is_used_but_never_stale(tmp_path):
     assert run_in_fresh_process(tmp_path) == (first, [1] * count)
 
 
+def test_a_specialised_kernel_takes_arrays_that_convert_and_refuses_others(backend):
+    example = np.zeros(2)[::-1]
+    example.flags.writeable = False
+    kernel = compiled.Kernel(total).specialise(example)
+    for values in (np.arange(3.0), np.arange(6.0)[::2], example):
+        assert kernel(values) == FACTOR * (values * values).sum()
+    if backend == "numba":
+        with pytest.raises(TypeError, match="No matching definition"):
+            kernel(np.arange(3))
+
+
 def test_with_numbas_compiler_off_the_interpreter_runs_every_kernel(monkeypatch):
     """As numba's own functions do under NUMBA_DISABLE_JIT."""
     monkeypatch.setattr("numba.core.config.DISABLE_JIT", 1)
