@@ -31,8 +31,8 @@ from .skeleton import POSE_FIELDS, Pose, PoseArrays, Skeleton, checked_skeleton,
 # A joint of a skeleton with its unit local rotation and its pose, for kernels.
 TREE_FIELDS = [("parent", np.int64), ("offset", np.float64, 3)]
 LINK = np.dtype([*TREE_FIELDS, ("unit", np.float64, 4), *POSE_FIELDS])
-# All float64 arrays of two axes convert to its type in calls of kernels. No pose has its shape.
-STRIDED = frozen(np.zeros((2, 2))[:, ::-1])
+# All C-contiguous float64 arrays of two axes convert to its type. No pose has its shape.
+EXAMPLE = frozen(np.zeros((2, 2)))
 # A slice of a batch with fewer joints than this takes less time than another thread to begin.
 THREAD_JOINTS = 100_000
 
@@ -103,11 +103,11 @@ class PreparedKinematics(threading.local):
         if isinstance(model, Skeleton):
             joints, self._shape = np.zeros(model.joint_count, LINK), (model.joint_count, 4)
             joints["parent"], joints["offset"] = model.arrays
-            forward = _forward_links.specialise(joints.view(FLOAT64), STRIDED)
+            forward = _forward_links.specialise(joints.view(FLOAT64), EXAMPLE)
         else:
             joints, self._shape = np.zeros(model.joint_count, POSED), (model.coordinate_count,)
             joints["joint"], unit = model.joints, np.empty(self._shape)
-            kernel = forward_posed.specialise(unit, joints.view(FLOAT64), STRIDED[0])
+            kernel = forward_posed.specialise(unit, joints.view(FLOAT64), EXAMPLE[0])
             forward = functools.partial(kernel, unit)
         joints["position"] = joints["rotation"] = np.nan
         self.pose = Pose(frozen(joints["position"]), frozen(joints["rotation"]))

@@ -104,7 +104,7 @@ class Kernel:
         """Return the kernel in force for arrays with the types of an example, on which it runs.
 
         Compiled, it then raises a TypeError for other types, which takes 0.1 ms. A read-only
-        strided example lets all arrays of its numbers and axes pass.
+        example lets writable arrays pass as well.
         """
         kernel = self.in_force
         with _specialising:

@@ -16,7 +16,6 @@ from plumbob.crosscheck.engines.skeleton_engine import MujocoSkeleton, coordinat
 from plumbob.reference import (
     IK_SOLVERS,
     ImplicitEuler,
-    Pose,
     Skeleton,
     State,
     forward_kinematics,
@@ -108,10 +107,8 @@ def kinematics_cases() -> Iterator[TimedCase]:
             (LONGER * batch, None, ", all cores", READ * THREAD_JOINTS),
         ):
             poses = _work("kinematics", name, f"{count:,} poses a call{suffix}")
-            prepare = partial(compiled_poses, skeleton, count)
-            yield TimedCase(poses, COMPILED, prepare, count, cores=cores)
-            fill = partial(prepared_poses, skeleton, count)
-            yield TimedCase(poses, PREPARED, fill, count, cores=cores)
+            for solver, start in ((COMPILED, compiled_poses), (PREPARED, prepared_poses)):
+                yield TimedCase(poses, solver, partial(start, skeleton, count), count, cores=cores)
             for engine in SKELETON_ENGINES if cores else ():
                 loop = partial(engine_poses, engine, skeleton, count)
                 yield TimedCase(poses, engine, loop, count)
@@ -145,8 +142,8 @@ def prepared_poses(skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
     local = _local_rotations(skeleton, *batch)
     if not batch:
         return partial(prepare(skeleton), local)
-    out = Pose(*map(np.copy, forward_kinematics(skeleton, local)))
-    return partial(forward_kinematics, skeleton, local, out=out)
+    positions, rotations = map(np.copy, forward_kinematics(skeleton, local))
+    return partial(forward_kinematics, skeleton, local, out=(positions, rotations))
 
 
 def engine_poses(name: str, skeleton: Skeleton, *batch: int) -> Callable[[], Any]:
