@@ -17,6 +17,7 @@ from .inverse_kinematics import (
     solve_ik,
     tasks,
 )
+from .inverse_kinematics.branches import PreparedSolutions, prepare_all_solutions
 from .inverse_kinematics.certificate import IKCertificate, IKCoverage, certify_ik
 from .inverse_kinematics.prepared import PreparedIK, prepare_ik
 from .inverse_kinematics.solve_tasks import PreparedTasks, TaskSolution, prepare_tasks, solve_tasks
@@ -45,6 +46,7 @@ __all__ = [
     "PoseJudgement",
     "PreparedIK",
     "PreparedKinematics",
+    "PreparedSolutions",
     "PreparedTasks",
     "Skeleton",
     "State",
@@ -60,6 +62,7 @@ __all__ = [
     "judge_step",
     "local_from_global",
     "prepare",
+    "prepare_all_solutions",
     "prepare_ik",
     "prepare_tasks",
     "resample",

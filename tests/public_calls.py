@@ -22,7 +22,8 @@ _INTERNAL = """
     mass_spring.constant_forces mass_spring.pin_targets rotation.check_unit rotation.roll_pitch_yaw
     tasks.BuiltInTask.evaluate tasks.BuiltInTask.factors tasks.CentreOfMass.factors
     tasks.Configuration.frame tasks.Coupling.factors tasks.FrameTask.factors tasks.IKTask
-    tasks.IKTask.evaluate tasks.LookAt.factors tasks.Posture.factors tasks.configuration"""
+    tasks.IKTask.evaluate tasks.LookAt.factors tasks.Posture.factors tasks.configuration
+    PreparedSolutions"""
 INTERNAL = _INTERNAL.split()
 RNG = functools.partial(np.random.default_rng, 9)
 OFFSETS, KINDS = (
@@ -154,6 +155,8 @@ VARIANTS = {
     "IKSolutions.with_turns": lambda position, rotation=None:
         list(plumbob.all_solutions(arm(6), Target(position, rotation)).with_turns()),
     "prepare, called": lambda q: plumbob.prepare(robot())(q),
+    "prepare_all_solutions, called": lambda target:
+        plumbob.prepare_all_solutions(arm(6))(target),
     "prepare_ik, called": lambda q, target: plumbob.prepare_ik(robot(), effector="f")(q, target),
     "prepare_tasks, called": lambda q, tasks: plumbob.prepare_tasks(robot(), tasks)(q),
     "PreparedTasks.set_target": retargeted,
@@ -205,6 +208,7 @@ def values():
              "mjcf": '<mujoco><worldbody><geom size="1"/></worldbody></mujoco>'}  # fmt: skip
     of_robot = {"skeleton": model, "model": model, "local_rotations": q[0], "pose": q[0],
                 "positions": None}  # fmt: skip
+    of_seven = {"robot": arm(7), "grid": {2: 0.2}, "effector": 6}
     triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
     target = Target(point, quaternions[0])
     positioned = plumbob.forward_kinematics(balls, local[0]).positions
@@ -247,7 +251,8 @@ def values():
         "jacobians.jacobian, balls": {"articulation": balls, "q": local},
         "solve_tasks": {"q": q[0]}, "prepare": {"q": q[0]}, "prepare_ik": {"q": q[0]},
         "prepare_tasks": {"q": q[0]},
-        "all_solutions": {"robot": arm(7), "target": target, "grid": {2: 0.2}, "effector": 6},
+        "all_solutions": {**of_seven, "target": target}, "prepare_all_solutions": of_seven,
+        "prepare_all_solutions, called": {"target": np.append(point, quaternions[0])},
         "ImplicitEuler": {"solver": "newton", "start": None},
         "tasks": {"frame": "f", "relative_to": "b", "target_frame": "b", "point": point,
                   "axis": gravity, "origin": point, "axes": ones, "masses": ones, "centres": v,

@@ -38,7 +38,7 @@ ALIASES = {
     "local_rotations": "q", "pose": "q local_rotations", "position": "target residual",
     "shift": "mimics", "text": "BVH MJCF URDF x", "leader": "joint",
     "coefficients": "residual", "vertices": "masses", "masses": "springs", "result": "positions",
-    "relative_to": "frame", "target_frame": "frame",
+    "relative_to": "frame", "target_frame": "frame", "target": "rotation",
 }  # fmt: skip
 BEYOND = {float: [math.nan, math.inf, -math.inf, 2e75], int: [2**63, -(2**63)]}
 BESIDE = {

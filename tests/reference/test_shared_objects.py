@@ -14,6 +14,7 @@ from plumbob import (
     all_solutions,
     forward_kinematics,
     prepare,
+    prepare_all_solutions,
     prepare_ik,
     prepare_tasks,
     rotation,
@@ -91,6 +92,17 @@ def solutions(rng):
     return all_solutions(UR, Target(pose.positions[-1], pose.rotations[-1])).coordinates.ravel()
 
 
+def prepared_solutions():
+    solve = prepare_all_solutions(UR)
+
+    def answer(rng):
+        pose = forward_kinematics(UR, UR.random(rng))
+        target = np.append(pose.positions[-1], pose.rotations[-1])
+        return solve(target).coordinates.ravel().copy()
+
+    return answer
+
+
 def steps(solver):
     system, state = scenes.lab_cloth(size=5)
     integrator = ImplicitEuler(system, h=1 / 60, solver=solver)
@@ -113,6 +125,7 @@ SHARED = {
     "solve_tasks": lambda: tasks,
     "prepare_tasks": prepared_tasks,
     "all_solutions": lambda: solutions,
+    "prepare_all_solutions": prepared_solutions,
     **{f"ImplicitEuler, {solver}": lambda solver=solver: steps(solver) for solver in STEP_SOLVERS},
 }
 

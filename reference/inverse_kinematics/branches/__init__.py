@@ -6,6 +6,7 @@ angles of `subproblems.py`. `settle.py` checks the results by forward kinematics
 
 import itertools
 import math
+import threading
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import arguments
-from ...arguments import FloatArray, is_plain, shown
+from ...arguments import FloatArray, frozen, is_plain, shown
 from ...articulation import LIMIT_TOLERANCE, Articulation
 from ...model import Model, checked_model, effector_of
 from ..bounded_step import FULL_CIRCLE
@@ -27,14 +28,17 @@ from ..problem import (
 )
 from ..solve import solve_checked, target_rows
 from .arms import SEARCH, Arm, Arms, arms_of
-from .closed_forms import CANDIDATES, HINGES, LARGEST_COUNT
-from .settle import FIGURES, TOLERANCE, closed_form_kernel, settle_kernel
-from .subproblems import CERTAIN, EVERY_ANGLE
+from .closed_forms import CANDIDATES, FIGURES, HINGES, LARGEST_COUNT, SOLUTIONS_AT, TARGET_AT
+from .settle import TOLERANCE, closed_form_kernel, settle_kernel
+from .subproblems import CERTAIN, DOUBTFUL, EVERY_ANGLE
 
 # Random starts of a search.
 RESTARTS = 256
 # A start of the search is given up at this distance from the target, over the reach, and angle.
 SEARCH_TOLERANCE = 1e-6
+# The target in a block of an arm, a position and a rotation.
+_POSE = 7
+_POSITION, _ROTATION = slice(TARGET_AT, TARGET_AT + 3), slice(TARGET_AT + 3, TARGET_AT + _POSE)
 
 
 class IKSolutions(NamedTuple):
@@ -84,15 +88,13 @@ class IKSolutions(NamedTuple):
                 yield np.clip(q + FULL_CIRCLE * np.array(counts), *self.turn_limits)
 
 
-class _ArmSolutions(NamedTuple):
+class _Solved(NamedTuple):
     """The solutions of an arm: see IKSolutions."""
 
     rows: FloatArray  # the arm's coordinates, then FIGURES
     method: str
     complete: bool
     continuum: bool
-    starts: int = 0  # of a search, those that come to a solution
-    single: int = 0  # and those that alone come to theirs
 
 
 def all_solutions(
@@ -115,9 +117,9 @@ def all_solutions(
     The list is up to whole revolutions, which `IKSolutions.with_turns` adds. An arm whose closed
     form comes to no solution near a singular pose is searched as well.
 
-    All solutions are polished by Newton's method, reach the target within 1e-9, of the reach and in
-    radians, and differ by more than 1e-6. A robot of seven joints has a continuum of solutions: a
-    joint is locked at values of a grid, and the others are solved for.
+    All solutions reach the target within 1e-9, of the reach and in radians, and differ by more than
+    1e-6; Newton's method polishes those further off than 1e-12. A robot of seven joints has a
+    continuum of solutions: a joint is locked at values of a grid, and the others are solved for.
 
     Args:
         robot: an Articulation or a Robot; hinges and slides move the effector.
@@ -132,18 +134,83 @@ def all_solutions(
         ValueError: if an argument is not valid, the target has no rotation or is a batch, a joint
             is no hinge or slide, or more than six joints remain.
     """
+    model, *search = _checked_robot(robot, restarts, seed)
+    pose = _checked_pose(model, target, effector)
+    return _all_solutions(arms_of(model, pose.joint, grid), pose, *search)
+
+
+class PreparedSolutions(threading.local):
+    """`all_solutions` of a robot, a pose a call; a closed form fills the same arrays every time.
+
+    Each thread that shares the object has arrays of its own.
+    """
+
+    def __init__(self, arms: Arms, joint: int, restarts: int, seed: int):
+        """Allocate the arrays of a thread; `prepare_all_solutions` checks the arguments."""
+        self._problem = arms, joint, restarts, seed
+        block, kernel = arms.members[0].block.copy(), closed_form_kernel.in_force
+        lists: dict[Any, IKSolutions] = {}
+        shape = (-1,)  # which no array has
+        if arms.members[0].is_plain:
+            shape, rows = (_POSE,), _solution_rows(block)
+            lists = {
+                (count, status): _listed(arms, rows, count, status)
+                for count in range(CANDIDATES + 1)
+                for status in (CERTAIN, DOUBTFUL, EVERY_ANGLE)
+                if count or status == CERTAIN  # else there is a search
+            }
+        # one attribute, as a thread's attribute takes 0.05 µs
+        self._work = shape, block[TARGET_AT:][:_POSE], kernel, block, lists
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return what makes a copy, which has arrays of its own."""
+        return type(self), self._problem
+
+    def __call__(self, target: ArrayLike) -> IKSolutions:
+        """Return all solutions of a pose; the next call overwrites those of a closed form.
+
+        Args:
+            target: the effector's position [m] and rotation, (7,).
+
+        Raises:
+            ValueError: as `all_solutions` does. Earlier solutions are then not defined.
+        """
+        shape, row, kernel, block, lists = self._work
+        if is_plain(target, shape):
+            row[...] = target
+            solutions = lists.get(kernel(block))
+            if solutions is not None:
+                return solutions
+        arms, joint, restarts, seed = self._problem
+        values = arguments.floats("target", target, _POSE)
+        pose = CheckedTarget(joint, values[:3], values[3:], 1.0)
+        return _all_solutions(arms, pose, restarts, seed)
+
+
+def prepare_all_solutions(
+    robot: Model,
+    effector: int | str | None = None,
+    *,
+    grid: Mapping[int | str, ArrayLike] | None = None,
+    restarts: int = RESTARTS,
+    seed: int = 0,
+) -> PreparedSolutions:
+    """Return `all_solutions` for many poses: `prepare_all_solutions(robot)(target)`.
+
+    Arguments and errors are as for `all_solutions`. The kernel is of the backend now in force.
+    """
+    model, *search = _checked_robot(robot, restarts, seed)
+    joint = effector_of(model, effector)
+    return PreparedSolutions(arms_of(model, joint, grid), joint, *search)
+
+
+def _checked_robot(robot: Model, restarts: int, seed: int) -> tuple[Articulation, int, int]:
+    """Return the arguments that no pose needs."""
     model = checked_model(robot, "robot")
     if not isinstance(model, Articulation):
         raise ValueError("robot: expected hinges and slides, got a Skeleton")
-    pose = _checked_pose(model, target, effector)
-    arms = arms_of(model, pose.joint, grid)
     count = arguments.count("restarts", restarts, minimum=1)
-    seed = arguments.integer("seed", seed, minimum=0)
-    if len(arms.members) == 1 and arms.members[0].is_plain:
-        solutions = _plain(arms, pose)
-        if len(solutions.coordinates) or solutions.complete:
-            return solutions
-    return _merged(arms, [_solutions_of(arm, pose, count, seed) for arm in arms.members])
+    return model, count, arguments.integer("seed", seed, minimum=0)
 
 
 def _checked_pose(model: Articulation, target: Any, effector: int | str | None) -> CheckedTarget:
@@ -161,76 +228,84 @@ def _checked_pose(model: Articulation, target: Any, effector: int | str | None) 
     return checked
 
 
-def _plain(arms: Arms, pose: CheckedTarget) -> IKSolutions:
-    """Return the solutions of an arm with a closed form, whose joints are all the robot has."""
-    (arm,) = arms.members
-    rows, is_certain, continuum = _closed_form(arm, pose)
+def _all_solutions(arms: Arms, pose: CheckedTarget, restarts: int, seed: int) -> IKSolutions:
+    """Return the solutions of all arms, as `all_solutions` does."""
+    arm = arms.members[0]
+    if arm.is_plain:
+        rows, count, status = _closed_form(arm, pose)
+        if count or status == CERTAIN:
+            return _listed(arms, rows, count, status)
+    return _merged(arms, [_arm_solutions(arm, pose, restarts, seed) for arm in arms.members])
+
+
+def _listed(arms: Arms, rows: FloatArray, count: int, status: int) -> IKSolutions:
+    """Return the first rows as solutions of an arm whose joints are all the robot has."""
+    arm = arms.members[0]
     return IKSolutions(
-        rows[:, :HINGES], rows[:, HINGES], rows[:, HINGES + 1], arm.method,
-        arm.is_exact and is_certain, continuum, 0.0, {}, arms.turn_limits,
+        rows[:count, :HINGES], rows[:count, HINGES], rows[:count, HINGES + 1], arm.method,
+        arm.is_exact and status == CERTAIN, status == EVERY_ANGLE, 0.0, {}, arms.turn_limits,
     )  # fmt: skip
 
 
-def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, bool, bool]:
-    """Return rows of solutions, whether their number is certain, and whether some are continua."""
-    rows = np.empty((CANDIDATES, HINGES + FIGURES))
-    count, status, doubts = closed_form_kernel(*arm.flat, pose.position, pose.rotation, rows)
-    rows.flags.writeable = False
+def _solution_rows(block: FloatArray) -> FloatArray:
+    """Return the rows of solutions in a block, (candidate, HINGES + FIGURES), read-only."""
+    rows: Any = block[SOLUTIONS_AT:].reshape(CANDIDATES, HINGES + FIGURES)
+    rows.setflags(False)  # by its name it takes twice as long
+    return rows
+
+
+def _closed_form(arm: Arm, pose: CheckedTarget) -> tuple[FloatArray, int, int]:
+    """Return rows, how many of them are solutions, and the certainty of their number."""
+    block = arm.block.copy()
+    block[_POSITION], block[_ROTATION] = pose.position, pose.rotation
+    count, status = closed_form_kernel(block)
     if count < 0:
         check_numbers([pose])
         raise ValueError("rotation: expected a quaternion within 1e-6 of unit length")
-    return rows[:count], status == CERTAIN and not doubts, status == EVERY_ANGLE
+    return _solution_rows(block), count, status
 
 
-def _solutions_of(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _ArmSolutions:
+def _arm_solutions(arm: Arm, pose: CheckedTarget, restarts: int, seed: int) -> _Solved:
     """Return the solutions of an arm, by its closed form if there is one."""
     if arm.method == SEARCH:
         return _by_search(arm, pose, restarts, seed, SEARCH_TOLERANCE)
-    rows, is_certain, continuum = _closed_form(arm, pose)
-    if len(rows) or is_certain:
-        return _ArmSolutions(rows, arm.method, arm.is_exact and is_certain, continuum)
+    rows, count, status = _closed_form(arm, pose)
+    is_certain, continuum = status == CERTAIN, status == EVERY_ANGLE
+    if count or is_certain:
+        return _Solved(rows[:count], arm.method, arm.is_exact and is_certain, continuum)
     # Newton's method fails near this singular pose: the search has to come down to TOLERANCE
     searched = _by_search(arm, pose, restarts, seed, TOLERANCE)
     return searched._replace(continuum=searched.continuum or continuum)
 
 
-def _by_search(
-    arm: Arm, pose: CheckedTarget, restarts: int, seed: int, tolerance: float
-) -> _ArmSolutions:
+def _by_search(arm: Arm, pose: CheckedTarget, count: int, seed: int, tolerance: float) -> _Solved:
     """Return the solutions from random starts that reach a pose within a tolerance."""
     (pose,) = check_numbers([pose])
-    starts = arm.articulation.random(np.random.default_rng(seed), restarts)
+    starts = arm.articulation.random(np.random.default_rng(seed), count)
     tolerances = tolerance * arm.mechanism.reach, tolerance
     settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False, 1)
     ends = solve_checked(arm.articulation, starts, [pose], settings)
     is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
     candidates = np.ascontiguousarray(ends.coordinates[is_near][:, arm.mechanism.columns])
     rows = np.empty((len(candidates), len(arm.columns) + FIGURES))
-    count, _ = settle_kernel(
-        tuple(arm.mechanism), candidates, target_rows([pose], ()).view(TARGET)[None], rows
-    )
-    rows = rows[:count]
-    hits = rows[:, -1]
-    single = int((hits == 1.0).sum())
-    return _ArmSolutions(rows, SEARCH, False, count > LARGEST_COUNT, int(hits.sum()), single)
+    target = target_rows([pose], ()).view(TARGET)
+    count, _ = settle_kernel(tuple(arm.mechanism), candidates, target, rows)
+    return _Solved(rows[:count], SEARCH, False, count > LARGEST_COUNT)
 
 
-def _merged(arms: Arms, solved: list[_ArmSolutions]) -> IKSolutions:
+def _merged(arms: Arms, solved: list[_Solved]) -> IKSolutions:
     """Return the solutions of all arms."""
-    coordinates = np.repeat(
-        [arm.rest for arm in arms.members], [len(s.rows) for s in solved], axis=0
-    )
-    rows = solved[0].rows if len(solved) == 1 else np.concatenate([s.rows for s in solved])
+    rests, rows = [arm.rest for arm in arms.members], np.concatenate([s.rows for s in solved])
+    coordinates = np.repeat(rests, [len(s.rows) for s in solved], axis=0)
     coordinates[:, arms.members[0].columns] = rows[:, :-FIGURES]
     distance, angle, _ = rows[:, -FIGURES:].T.copy()
-    for values in (coordinates, distance, angle):
-        values.flags.writeable = False
     methods = dict.fromkeys(s.method for s in solved)
-    starts, unseen = sum(s.starts for s in solved), float(SEARCH in methods)
-    if starts:
-        unseen = sum(s.single for s in solved) / starts
+    # how many starts of a search came to each solution
+    starts = np.concatenate([s.rows[:, -1] * (s.method == SEARCH) for s in solved])
+    single, total = float((starts == 1.0).sum()), float(starts.sum())
+    unseen = single / total if total else float(SEARCH in methods)
     return IKSolutions(
-        coordinates, distance, angle, ", ".join(methods), all(s.complete for s in solved),
-        any(s.continuum for s in solved), unseen, arms.grid,
+        frozen(coordinates), frozen(distance), frozen(angle), ", ".join(methods),
+        all(s.complete for s in solved), any(s.continuum for s in solved), unseen, arms.grid,
         arms.turn_limits,
     )  # fmt: skip

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ... import arguments
-from ...arguments import FloatArray, IndexArray, frozen
-from ...articulation import HINGE, Articulation, joint_transform
+from ...arguments import FLOAT64, FloatArray, IndexArray, frozen
+from ...articulation import FIXED, HINGE, Articulation, joint_transform
 from ...jacobians import jacobian
 from ...skeleton import Skeleton
 from ..bounded_step import FULL_CIRCLE
@@ -34,7 +34,7 @@ class Arm(NamedTuple):
     mechanism: Mechanism  # the joints that move the effector
     method: str  # the name of its closed form, or SEARCH
     is_exact: bool  # whether its axes are those of the form to rounding
-    flat: tuple[Any, ...]  # the fields of mechanism and form, for the kernel
+    block: FloatArray  # its record (ARM) for the kernel, as floats
     columns: IndexArray  # of the mechanism's coordinates among the robot's
     rest: FloatArray  # coordinates of the robot: locked values, else neutral
     is_plain: bool  # whether it has a closed form, and the robot no other coordinates
@@ -82,12 +82,9 @@ def arms_of(model: Articulation, effector: int, grid: Mapping[Any, ArrayLike] | 
 
 def _freedoms(model: Articulation, mechanism: Mechanism) -> list[int]:
     """Return the joints of a model whose coordinates are a mechanism's."""
-    owners = {
-        int(model.joints["coordinate"][j]): j
-        for j, kind in enumerate(model.kinds)
-        if kind != "fixed" and j not in model.mimics
-    }
-    return [owners[column] for column in mechanism.columns.tolist()]
+    leads = model.joints["leader"] == np.arange(model.joint_count)
+    own = leads & (model.joints["kind"] != FIXED)
+    return np.flatnonzero(own & np.isin(model.joints["coordinate"], mechanism.columns)).tolist()
 
 
 def _checked_grid(model: Articulation, grid: Mapping[Any, ArrayLike]) -> dict[int, FloatArray]:
@@ -108,9 +105,7 @@ def _checked_grid(model: Articulation, grid: Mapping[Any, ArrayLike]) -> dict[in
     return values
 
 
-def _default_grid(
-    model: Articulation, mechanism: Mechanism, effector: int
-) -> dict[int, FloatArray]:
+def _default_grid(model: Articulation, mechanism: Mechanism, effector: int) -> dict[int, Any]:
     """Return values of the joint with the largest motion while the effector stays.
 
     Joints without which the arm has a closed form come first.
@@ -143,11 +138,11 @@ def arm_of(model: Articulation, effector: int, values: Mapping[int, float]) -> A
     form = closed_form(mechanism) if mechanism.freedoms == HINGES else None
     columns = remaining[mechanism.columns]
     if form is None or _is_singular(articulation, mechanism, effector):
-        return Arm(articulation, mechanism, SEARCH, False, (), columns, rest, False)
+        return Arm(articulation, mechanism, SEARCH, False, np.empty(0), columns, rest, False)
     is_plain = np.array_equal(columns, np.arange(len(rest)))
-    method, is_exact = FORMS[form.form], form.deviation <= EXACT
-    flat = tuple(mechanism), tuple(form)
-    return Arm(articulation, mechanism, method, is_exact, flat, columns, rest, is_plain)
+    method, is_exact = FORMS[form["form"][0]], bool(form["deviation"][0] <= EXACT)
+    block = form.view(FLOAT64)
+    return Arm(articulation, mechanism, method, is_exact, block, columns, rest, is_plain)
 
 
 def _turn_limits(arm: Arm) -> FloatArray:

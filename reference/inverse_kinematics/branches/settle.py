@@ -2,8 +2,6 @@
 
 import math
 
-import numpy as np
-
 from ...articulation import HINGE, LIMIT_TOLERANCE
 from ...backend.compiled import Kernel
 from ..bounded_step import (
@@ -14,11 +12,11 @@ from ..bounded_step import (
     solve_system,
 )
 from ..linear_algebra import clear, inner
-from ..mechanism import TARGET, Mechanism, errors, new_data, update_forward_kinematics
+from ..mechanism import Mechanism, errors, new_data, update_forward_kinematics
 from ..restarts import copy_row
 from ..solve_mechanism import normalise_target
-from .closed_forms import ClosedForm, fill_candidates, new_roots
-from .subproblems import CERTAIN
+from .closed_forms import ARM, HINGES, fill_candidates
+from .subproblems import CERTAIN, DOUBTFUL
 
 # A solution reaches its target within this, over the reach, and this angle [rad]. Of 2,098
 # solutions for 300 poses of a UR5 the worst is off by 2.4e-14.
@@ -29,63 +27,65 @@ TOLERANCE = 1e-9
 DUPLICATE = 1e-6
 # A candidate this near to the target or a limit may or may not be a solution: near a double root,
 # rounding by e moves the root by sqrt(e).
-DOUBTFUL = 1e-6
+IN_DOUBT = 1e-6
 # Errors below this, over the reach, are rounding of the forward kinematics: some ten for each of
 # six joints.
 ROUNDING = 64 * 2.220446049250313e-16
+# Where the number of roots is certain, none are nearly double: a candidate this near to the target
+# is a solution to more digits than promised. Axes of robot files meet to 1e-12.
+SETTLED = 1e-3 * TOLERANCE
 # A candidate this far beyond its limits, over the reach or [rad], does not come back: the polish
 # moves by far less. A smaller number would only save time.
 BEYOND_RETURN = 0.1
 # Steps of Newton's method; closed forms need none or a single step. Near a double root a step
 # halves the error and quarters the residual: twelve divide the residual by 1.7e7.
 NEWTON_STEPS = 12
-# Columns behind the coordinates: distance [m], angle [rad], and how many candidates came there.
-FIGURES = 3
 
 
-def solve_closed_form(mechanism_fields, form_fields, position, rotation, rows):
-    """Fill the solutions of a closed form; return their number, -1 for an invalid target.
+def solve_closed_form(block):
+    """Fill the solutions of an arm; return their number, -1 for an invalid target, and its status.
 
-    Also return the certainty of the number of candidates, and how many of them are in doubt. The
-    fields of Mechanism and of ClosedForm come in plain tuples, as for `solve_mechanisms`. Position
-    [m] and rotation are the target's; a row to fill has coordinates of the mechanism, then FIGURES.
+    The arm comes as a block of floats, which is passed to a kernel faster than a record.
     """
-    target = np.empty(1, TARGET)
-    for k in range(3):
-        target["position"][0, k] = position[k]
-    for k in range(4):
-        target["rotation"][0, k] = rotation[k]
-    target["weight"][0] = 1.0
+    arm = block.view(ARM)[0]
+    target = arm["target"]
     if not normalise_target(target):
-        return -1, CERTAIN, 0
-    mechanism, work = Mechanism(*mechanism_fields), new_roots()
-    count, status = fill_candidates(ClosedForm(*form_fields), mechanism.reach, target, work)
-    count, doubts = settle(mechanism, target, work.candidates[:count], rows)
-    return count, status, doubts
+        return -1, CERTAIN
+    mechanism = Mechanism(
+        arm["joints"], arm["columns"], arm["effectors"], arm["moves"], arm["adjacent"],
+        arm["reach"], HINGES, HINGES,
+    )  # fmt: skip
+    candidates = arm["candidates"][: fill_candidates(arm)]
+    near = SETTLED if arm["status"][0] == CERTAIN else ROUNDING
+    count, doubts = settle(mechanism, target, candidates, arm["solutions"], near)
+    return count, max(arm["status"][0], min(doubts, DOUBTFUL))
 
 
-def settle_candidates(mechanism_fields, candidates, targets, rows):
+def settle_candidates(mechanism_fields, candidates, target, rows):
     """Fill the solutions among candidates; return their number and that of doubtful candidates."""
-    return settle(Mechanism(*mechanism_fields), targets[0], candidates, rows)
+    return settle(Mechanism(*mechanism_fields), target, candidates, rows, ROUNDING)
 
 
-def settle(mechanism, target, candidates, rows):
-    """Fill the solutions among candidates; see `settle_candidates`."""
+def settle(mechanism, target, candidates, rows, near):
+    """Fill the solutions among candidates; those `near` the target within limits need no polish."""
     data, system = new_data(mechanism), new_system(mechanism.equations, mechanism.freedoms)
     clear(system.active)
     count, doubts, reach, width = 0, 0, mechanism.reach, len(data.q)
     for i in range(len(candidates)):
         copy_row(candidates[i], data.q)
-        if bring_within_limits(mechanism.joints, data.q, reach) > BEYOND_RETURN:
-            continue
-        polish(mechanism, target, data, system)
         gap = bring_within_limits(mechanism.joints, data.q, reach)
-        if gap > 0.0:
-            update_forward_kinematics(mechanism, data)
+        if gap > BEYOND_RETURN:
+            continue
+        update_forward_kinematics(mechanism, data)
         distance, angle = errors(mechanism, target, data, 0)
-        is_near = distance <= DOUBTFUL * reach and angle <= DOUBTFUL and gap <= DOUBTFUL
+        if not (distance <= near * reach and angle <= near and gap <= 0.0):
+            polish(mechanism, target, data, system)
+            gap = bring_within_limits(mechanism.joints, data.q, reach)
+            if gap > 0.0:
+                update_forward_kinematics(mechanism, data)
+            distance, angle = errors(mechanism, target, data, 0)
         if not (distance <= TOLERANCE * reach and angle <= TOLERANCE and gap <= LIMIT_TOLERANCE):
-            doubts += is_near
+            doubts += max(distance / reach, angle, gap) <= IN_DOUBT
             continue
         k = 0
         while k < count and not is_same(mechanism.joints, rows[k], data.q, reach):
@@ -100,7 +100,6 @@ def settle(mechanism, target, candidates, rows):
 
 def polish(mechanism, target, data, system):
     """Improve coordinates by Newton's method while steps help; see `TaskSystem` for the errors."""
-    update_forward_kinematics(mechanism, data)
     fill_errors(mechanism, target, data, system.e)
     square, rounding = inner(system.e, system.e), ROUNDING * mechanism.reach
     for _ in range(NEWTON_STEPS):
@@ -129,11 +128,10 @@ def move(mechanism, data, step, share):
 
 
 def bring_within_limits(joints, q, reach):
-    """Bring angles within limits, as near to the middle as whole revolutions do.
+    """Bring angles within limits, as near to the middle as whole revolutions do; return the excess.
 
     A joint with followers keeps its angle, as a revolution would not bring the followers around.
-
-    Returns how far beyond a limit some coordinate is, lengths over the reach.
+    The excess is how far beyond a limit some coordinate is, lengths over the reach.
     """
     gap = 0.0
     for j in range(len(joints)):

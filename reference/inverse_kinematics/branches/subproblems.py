@@ -18,7 +18,8 @@ DOUBLE_ROOT = 1e-14
 SAME_ROOT = 1e-7
 # A cosine beyond 1 by less is 1: an earlier angle may be off by as much.
 CLAMPED = 1e-7
-# The certainty of a number of roots: certain; in doubt; every angle is a root.
+# The certainty of a number of roots: certain; in doubt; every angle is a root. The status of an arm
+# is the greatest of all its angles.
 CERTAIN, DOUBTFUL, EVERY_ANGLE = range(3)
 # The number is in doubt with a cosine within this of 1, a quartic as near to zero, or vectors as
 # near to the axis. Two roots are then within 2.8e-4 rad of each other. Doubt only starts a search.
@@ -52,51 +53,59 @@ def projection(u, axis, v):
     return k, dot(u, v) - k, dot(u, cross(axis, v))
 
 
-def angle_between(axis, v, w):
+def angle_between(arm, axis, v, w):
     """Return the angle about an axis from v to the half-plane of w (subproblem 1).
 
-    Also return its certainty: if v or w is on the axis, every angle is a solution, here zero.
+    Raises the arm's status: if v or w is on the axis, every angle is a solution, here zero.
     """
     c, s = dot(v, w) - dot(axis, v) * dot(axis, w), dot(axis, cross(v, w))
     product = math.sqrt(c * c + s * s)
+    if product <= NEARLY_DOUBLE:
+        raise_status(arm, EVERY_ANGLE if product <= SINGULAR * SINGULAR else DOUBTFUL)
     if product <= ZERO * ZERO:
-        return (1.0, 0.0), EVERY_ANGLE
-    status = DOUBTFUL if product <= NEARLY_DOUBLE else CERTAIN
-    return (c / product, s / product), EVERY_ANGLE if product <= SINGULAR * SINGULAR else status
+        return 1.0, 0.0
+    return c / product, s / product
 
 
-def line_roots(k, a, b, deviation, roots):
-    """Fill the angles of k + a cos + b sin = 0 (subproblems 3 and 4).
+def line_roots(arm, k, a, b, roots):
+    """Fill the angles of k + a cos + b sin = 0 (subproblems 3 and 4); return their number.
 
-    A deviation of the coefficients may hide or part a double root: the angles are then near it.
-
-    Returns the number of angles and its certainty; if every angle is a root, fills in zero.
+    The deviation of the arm may hide or part a double root: the angles are then near it. Raises the
+    arm's status; if every angle is a root, fills in zero.
     """
     r = math.sqrt(a * a + b * b)
     if r <= ZERO:
-        return every_angle(roots) if abs(k) <= ZERO else (0, CERTAIN)
-    is_singular = r <= SINGULAR and abs(k) <= SINGULAR  # rounding alone determines the angles
-    x, a, b, largest = -k / r, a / r, b / r, 1.0 - min(1.0, deviation / r)
+        return every_angle(arm, roots) if abs(k) <= ZERO else 0
+    if r <= SINGULAR and abs(k) <= SINGULAR:  # rounding alone determines the angles
+        raise_status(arm, EVERY_ANGLE)
+    deviation = arm["deviation"] / r
+    x, a, b, largest = -k / r, a / r, b / r, 1.0 - min(1.0, deviation)
     excess = abs(x) - 1.0
-    if excess > CLAMPED + deviation / r:
-        return 0, EVERY_ANGLE if is_singular else CERTAIN
-    status = DOUBTFUL if excess >= -NEARLY_DOUBLE else CERTAIN
-    status = EVERY_ANGLE if is_singular else status
+    if excess > CLAMPED + deviation:
+        return 0
+    if excess >= -NEARLY_DOUBLE:
+        raise_status(arm, DOUBTFUL)
     x = min(max(x, -largest), largest)
     y = math.sqrt(1.0 - x * x)
     if y <= SAME_ROOT:
         sign = math.copysign(1.0, x)
         roots[0, 0], roots[0, 1] = sign * a, sign * b
-        return 1, status
+        return 1
     roots[0, 0], roots[0, 1] = x * a - y * b, x * b + y * a
     roots[1, 0], roots[1, 1] = x * a + y * b, x * b - y * a
-    return 2, status
+    return 2
 
 
-def every_angle(roots):
+def every_angle(arm, roots):
     """Fill in the angle zero for all angles; see `line_roots`."""
+    raise_status(arm, EVERY_ANGLE)
     roots[0, 0], roots[0, 1] = 1.0, 0.0
-    return 1, EVERY_ANGLE
+    return 1
+
+
+def raise_status(arm, certainty):
+    """Note a number of roots that is less certain than those before."""
+    arm["status"][0] = max(arm["status"][0], certainty)
 
 
 def product(f, g):
@@ -122,39 +131,39 @@ def weighted_sum(s, p, t, q):
     )  # fmt: skip
 
 
-def conic_roots(p, deviation, roots, work):
+def conic_roots(arm, p, roots):
     """Fill the angles of p0 + p1 cos + p2 sin + p3 cos 2 + p4 sin 2 = 0, as `line_roots` does.
 
     These are the intersections of a conic with the unit circle (Elias & Wen 2022, subproblems 5 and
     6). In t, the tangent of half the angle, the equation is a quartic. Two intervals t in [-1, 1],
-    about 0 and about pi, cover the circle; a root at an end may come twice. `work`, (5, 12), holds
-    the roots of the derivatives.
+    about 0 and about pi, cover the circle; a root at an end may come twice.
     """
     size = abs(p[0]) + abs(p[1]) + abs(p[2]) + abs(p[3]) + abs(p[4])
     if size <= ZERO * ZERO:
-        return every_angle(roots)
-    count, status = 0, CERTAIN
+        return every_angle(arm, roots)
+    count, work = 0, arm["quartic"]
     for side in (1.0, -1.0):
         p1, p2 = side * p[1], side * p[2]
         quartic = (
             p[0] + p1 + p[3], 2.0 * p2 + 4.0 * p[4], 2.0 * p[0] - 6.0 * p[3],
             2.0 * p2 - 4.0 * p[4], p[0] - p1 + p[3],
         )  # fmt: skip
-        n, nearest = quartic_roots(quartic, (DOUBLE_ROOT + deviation) * size, work)
+        n, nearest = quartic_roots(quartic, (DOUBLE_ROOT + arm["deviation"]) * size, work)
         if nearest <= NEARLY_DOUBLE * size:
-            status = DOUBTFUL
+            raise_status(arm, DOUBTFUL)
         for i in range(n):
             t = work[0, i]
             c, s = (1.0 - t * t) / (1.0 + t * t), 2.0 * t / (1.0 + t * t)
             roots[count, 0], roots[count, 1] = side * c, side * s
             count += 1
-    return count, status
+    return count
 
 
 def quartic_roots(a, margin, work):
     """Fill work[0] with the roots of a0 + a1 t + ... + a4 t^4 in [-1, 1]; return their number.
 
-    Also return the least absolute value at an extremum or the right end.
+    The other rows of `work`, (5, 12), are for roots of the derivatives. Also return the least
+    absolute value at an extremum or the right end.
 
     Between extrema, the roots of the derivative, a polynomial has a root where its sign changes. A
     value within the margin at an extremum or an end is a double root or a root at the end.

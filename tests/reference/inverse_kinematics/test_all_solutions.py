@@ -1,9 +1,21 @@
 """All solutions of a pose: laws of the list, closed forms against searches, singular poses."""
 
+import copy
+import pickle
+from functools import partial
+
 import numpy as np
 import pytest
 
-from plumbob import Articulation, Mimic, Skeleton, Target, all_solutions, solve_ik
+from plumbob import (
+    Articulation,
+    Mimic,
+    Skeleton,
+    Target,
+    all_solutions,
+    prepare_all_solutions,
+    solve_ik,
+)
 from plumbob.reference import forward_kinematics, rotation, set_backend
 from plumbob.reference.inverse_kinematics.branches.closed_forms import FORMS
 
@@ -75,6 +87,16 @@ def assert_lists(solutions, arm, target, q=None):
     assert (apart + 9.0 * np.eye(len(apart))).min(initial=9.0) > SAME
     if q is not None:
         assert differences(solutions.coordinates, q[None]).min(initial=9.0) < SAME
+
+
+def assert_same(a, b):
+    """Check that two lists have the same bits."""
+    for values, expected in zip(a, b, strict=True):
+        np.testing.assert_equal(values, expected)
+
+
+def row_of(target):
+    return np.array([*target.position, *target.rotation])
 
 
 @pytest.fixture(params=ARMS)
@@ -245,7 +267,8 @@ def test_both_backends_agree(named, rng):
     target = target_of(arm, arm.random(rng))
     compiled = all_solutions(arm, target)
     with set_backend("python"):
-        plain = all_solutions(arm, target)
+        plain, solve = all_solutions(arm, target), prepare_all_solutions(arm)
+    assert_same(solve(row_of(target)), plain)  # which keeps the backend
     np.testing.assert_allclose(plain.coordinates, compiled.coordinates, atol=1e-9)
 
 
@@ -290,6 +313,7 @@ def test_near_singular_poses_without_a_candidate_are_searched(name, backwards, q
     assert_lists(solutions, arm, target)
     assert len(solutions.coordinates) > 0
     assert (solutions.method, solutions.complete) == ("restarts", False)
+    assert_same(prepare_all_solutions(arm)(row_of(target)), solutions)
 
 
 @pytest.mark.parametrize("count", [60, pytest.param(6000, marks=pytest.mark.slow)])
@@ -420,6 +444,83 @@ def test_other_joints_stay_at_neutral(rng):
     np.testing.assert_array_equal(solutions.coordinates[:, 6:], [[1, 0, 0, 0]] * len(expected))
 
 
+# Arms, and settings of `all_solutions`: closed forms, a search, a grid.
+PREPARED = {
+    **{name: (geometry[:2], {}) for name, geometry in ARMS.items()},
+    "general": (GENERAL, {"restarts": 12, "seed": 3}),
+    "seven": (SEVEN, {"grid": {2: [0.1, 0.4]}, "effector": 7}),
+}
+
+
+@pytest.mark.parametrize("name", PREPARED)
+def test_prepared_lists_are_those_of_all_solutions(name, rng):
+    geometry, settings = PREPARED[name]
+    arm = arm_of(*geometry)
+    solve = prepare_all_solutions(arm, **settings)
+    targets = [target_of(arm, q) for q in arm.random(rng, 4)]
+    targets += [
+        Target([3.0, 2.0, 1.0], rotation.identity()),
+        target_of(arm, np.zeros(arm.coordinate_count)),
+    ]
+    for target in targets:
+        expected = all_solutions(arm, target, **settings)
+        for form in (row_of(target), row_of(target).tolist()):
+            solutions = solve(form)
+            assert_same(solutions, expected)
+            assert not any(values.flags.writeable for values in solutions[:3])
+
+
+def test_prepared_lists_share_their_arrays(named, rng):
+    """A kernel fills the arrays of the first list again; lists of `all_solutions` stay."""
+    arm = arm_of(*ARMS[named][:2])
+    solve, first, second = (
+        prepare_all_solutions(arm),
+        *(target_of(arm, q) for q in arm.random(rng, 2)),
+    )
+    kept, shared = all_solutions(arm, first), solve(row_of(first))
+    assert_same(shared, kept)
+    expected = all_solutions(arm, second)
+    assert_same(solve(row_of(second)), expected)
+    count = min(len(shared.coordinates), len(expected.coordinates))
+    np.testing.assert_array_equal(shared.coordinates[:count], expected.coordinates[:count])
+    assert (kept.coordinates[:count] != expected.coordinates[:count]).any()
+
+
+@pytest.mark.parametrize(
+    "duplicate", [copy.copy, copy.deepcopy, lambda solve: pickle.loads(pickle.dumps(solve))]
+)
+def test_a_copy_of_a_prepared_robot_has_arrays_of_its_own(duplicate, rng):
+    arm = arm_of(*ARMS["UR5"][:2])
+    targets = [target_of(arm, q) for q in arm.random(rng, 2)]
+    solve = prepare_all_solutions(arm)
+    lists = solve(row_of(targets[0])), duplicate(solve)(row_of(targets[1]))
+    for solutions, target in zip(lists, targets, strict=True):
+        assert_same(solutions, all_solutions(arm, target))
+
+
+# Axes meet only to this, as of robot files: candidates off by less than 1e-12 are not polished.
+OFF = 1e-13
+
+
+@pytest.mark.parametrize("name", ["Puma 560", "offset shoulder"])
+def test_a_candidate_beyond_a_limit_is_polished(name, rng):
+    """Near a singular pose a candidate that is 1e-13 off has angles 1e-9 beyond limits."""
+    axes, points, _ = ARMS[name]
+    q = np.array([0.3, -1.0, 0.8, 0.5, 1.6e-4, 0.4])
+    for _ in range(20):
+        arm = arm_of(axes, points + OFF * rng.standard_normal((6, 3)), upper=[*q, LIMIT])
+        assert_lists(all_solutions(arm, target_of(arm, q)), arm, target_of(arm, q), q)
+
+
+def test_candidates_near_a_double_root_are_polished_to_one(rng):
+    axes, points, _ = ARMS["UR5"]
+    q = np.array([0.3, -1.0, 0.0, 0.5, 0.9, 0.4])
+    for _ in range(5):
+        arm = arm_of(axes, points + OFF * rng.standard_normal((6, 3)))
+        listed = all_solutions(arm, target_of(arm, q)).coordinates
+        assert (differences(listed, q[None]) < 1e-4).sum() == 1
+
+
 POSE = Target([0.3, 0.2, 0.4], [1.0, 0.0, 0.0, 0.0])
 MISUSES = {
     "no rotation": ({"target": Target([0.3, 0.2, 0.4])}, "target: expected a Target with a rot"),
@@ -441,8 +542,32 @@ def test_misuse_is_named(changes, message):
     arguments = {"robot": arm_of(*SEVEN), "target": POSE} | changes
     with pytest.raises(ValueError, match=f"^{message}"):
         all_solutions(**arguments)
+    if arguments.pop("target") is POSE:
+        with pytest.raises(ValueError, match=f"^{message}"):
+            prepare_all_solutions(**arguments)
 
 
 def test_misuse_of_a_search_is_named_where_a_closed_form_needs_none():
-    with pytest.raises(ValueError, match=r"^restarts: expected"):
-        all_solutions(arm_of(*ARMS["UR5"][:2]), POSE, restarts=0)
+    arm = arm_of(*ARMS["UR5"][:2])
+    for call in (partial(all_solutions, arm, POSE), partial(prepare_all_solutions, arm)):
+        with pytest.raises(ValueError, match=r"^restarts: expected"):
+            call(restarts=0)
+
+
+BAD_ROWS = {
+    "too few": ([0.3, 0.2, 0.4], r"target: expected shape \(7,\)"),
+    "no number": ([np.nan, 0.2, 0.4, 1, 0, 0, 0], "target: expected finite"),
+    "no unit": ([0.3, 0.2, 0.4, 1.0, 0.1, 0, 0], "rotation: expected"),
+    "a word": ("left", "target: expected"),
+}
+
+
+@pytest.mark.parametrize(("row", "message"), BAD_ROWS.values(), ids=BAD_ROWS)
+@pytest.mark.parametrize("geometry", [ARMS["UR5"][:2], GENERAL], ids=["closed form", "search"])
+def test_misuse_of_a_prepared_robot_is_named(geometry, row, message):
+    arm = arm_of(*geometry)
+    solve = prepare_all_solutions(arm, restarts=4)
+    for form in (row, np.array(row)):
+        with pytest.raises(ValueError, match=f"^{message}"):
+            solve(form)
+    assert_same(solve(row_of(POSE)), all_solutions(arm, POSE, restarts=4))
