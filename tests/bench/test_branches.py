@@ -1,11 +1,16 @@
 """Lists of all solutions: what a solver misses and makes up is counted, and shown."""
 
+import importlib
+
+import numpy as np
 import pytest
 from table_cells import column
 
+from plumbob import PreparedSolutions
 from plumbob.bench.experiments.branches import blocks, branches, lists
 from plumbob.bench.measure.block import Scale
-from plumbob.bench.problems.robots import is_installed
+from plumbob.bench.problems.robot_targets import robot_targets
+from plumbob.bench.problems.robots import is_installed, robot
 from plumbob.bench.tables.results import Results
 
 OURS = "plumbob.bench.peers.ik.plumbob"
@@ -43,6 +48,17 @@ def test_missing_and_false_solutions_are_counted(importable):
     assert ours["missing"].tolist() == ours["wrong"].tolist() == [0] * count
     assert faulty["missing"].tolist() == faulty["wrong"].tolist() == [1] * count
     assert results["unable_lists"] == {"remark": "takes no arm"}
+
+
+@pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")
+def test_our_call_is_prepared_as_those_of_others_are():
+    request = robot_targets("ur5", 1).request(0)
+    solve = importlib.import_module(OURS).prepare_all(robot("ur5"))(request)
+    assert isinstance(solve.call.func, PreparedSolutions)
+    answer = solve()
+    expected = solve.call().coordinates
+    np.testing.assert_array_equal(answer.q, expected)
+    assert not np.shares_memory(answer.q, expected)
 
 
 @pytest.mark.skipif(not is_installed("ur5"), reason="example-robot-data is not installed")

@@ -11,7 +11,7 @@ from plumbob.reference import (
     IKSolution,
     Outcome,
     Target,
-    all_solutions,
+    prepare_all_solutions,
     prepare_ik,
     prepare_tasks,
     rotation,
@@ -94,11 +94,11 @@ def prepare(
 
 def prepare_all(robot: BenchRobot) -> SolveFactory:
     """Return the solver of all solutions, set up for a chain."""
-    articulation = urdf.parse(robot.text).articulation
+    solve = prepare_all_solutions(urdf.parse(robot.text).articulation)
 
     def make_solve(request: PoseRequest) -> Solve:
-        target = Target(request.positions[0], rotation.from_matrix(request.rotations[0]))
-        return Solve(partial(all_solutions, articulation, target), lambda s: (s.coordinates, None))
+        target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
+        return Solve(partial(solve, target), lambda s: (s.coordinates.copy(), None))
 
     return make_solve
 
