@@ -273,9 +273,16 @@ def test_a_loop_over_an_engine_ends_in_the_last_pose_of_our_batch():
     batch = timing_cases.compiled_poses(skeleton, 3)().positions
     for name in SKELETON_ENGINES:
         loop = timing_cases.engine_poses(name, skeleton, 3)
-        engine = inspect.getclosurevars(loop).nonlocals["call"].__self__
+        call = inspect.getclosurevars(loop).nonlocals["call"]
         assert len(loop()) == 3
-        np.testing.assert_allclose(engine.pose().positions, batch[-1], atol=1e-13)
+        if name == "Pinocchio":
+            import pinocchio
+
+            assert call.func is pinocchio.forwardKinematics, "no method of ours takes its time"
+            positions = [placement.translation for placement in call.args[1].oMi][1:]
+        else:
+            positions = call.__self__.pose().positions
+        np.testing.assert_allclose(positions, batch[-1], atol=1e-13)
 
 
 @pytest.mark.parametrize("name", timing_cases.ROBOTS)
