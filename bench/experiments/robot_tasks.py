@@ -14,7 +14,7 @@ from ..measure.progress import announce
 from ..measure.record import Record
 from ..measure.timing import attempt, restarted
 from ..measure.values import Booleans1, Fact, Floats1, Values
-from ..peers.catalogue import PLUMBOB, PLUMBOB_LM, TASK_SOLVERS
+from ..peers.catalogue import PLUMBOB_LM, TASK_SOLVERS, calls_of
 from ..peers.peer import ONE_START, RESTARTS, Peer
 from ..problems.evaluate import evaluator_of
 from ..problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle
@@ -26,6 +26,8 @@ ROBOT_TASK = "robot task"
 TOLERANCE = 1e-3  # [m], [rad]
 # Targets of a robot per target of a scale.
 _TARGETS = 0.01
+# The median of three calls leaves out a disturbed call, and the first, whose caches are cold.
+ROUNDS = 3
 
 
 class TaskValues(Values, frozen=True, kw_only=True):
@@ -33,7 +35,7 @@ class TaskValues(Values, frozen=True, kw_only=True):
 
     kind: Fact[str]  # of the attempts
     solved: Booleans1  # whether MuJoCo confirms the answer within the limits
-    seconds: Floats1  # the time of a call, all attempts together [s]
+    seconds: Floats1  # the time of a call, all attempts together, the median of its rounds [s]
     distance: Floats1  # from the middle of the limits, root mean square of all joints [rad]
 
 
@@ -44,36 +46,24 @@ def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every task of every arm held out, by every installed solver, with one start or more."""
     count = max(1, round(_TARGETS * scale.targets))
     for name in filter(is_installed, HELD_OUT):
-        peers = [peer for peer in TASK_SOLVERS if peer.is_installed]
-        for task, peer, kind in product(ROBOT_TASKS, peers, (ONE_START, RESTARTS)):
+        rows = product(ROBOT_TASKS, calls_of(TASK_SOLVERS), (ONE_START, RESTARTS))
+        for task, (solver, peer, call), kind in rows:
             facts = {"task": ROBOT_TASK, "kind": kind}
             facts["title"] = f"{title(name)}, {ROBOT_TASKS[task].title}"
             settings = {"version": peer.version, "seed": scale.seed, "attempts": kind}
-            measure = partial(meet, name, task, peer, kind, count, scale.seed)
-            block = partial(Block, SUITE, f"{task}/{name}")
-            solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
-            yield block(solver, measure, settings, count, facts)
-            if peer is PLUMBOB_LM:
-                measure = partial(measure, prepared=False)
-                yield block(f"{solver}, plain call", measure, settings, count, facts)
+            measure = partial(meet, name, task, peer, kind, count, scale.seed, **call)
+            yield Block(SUITE, f"{task}/{name}", solver, measure, settings, count, facts)
 
 
 def meet(
-    name: str,
-    task_name: str,
-    peer: Peer,
-    kind: str,
-    count: int,
-    seed: int,
-    prepared: bool = True,
+    name: str, task_name: str, peer: Peer, kind: str, count: int, seed: int, **call: bool
 ) -> Measured:
     """Solve all targets by a solver, from one start or with restarts; MuJoCo evaluates them."""
     announce(f"{task_name}, {name}, {peer.title}")
     arm, task, entry = robot(name), ROBOT_TASKS[task_name], peer.first(kind)
     module, settings = importlib.import_module(peer.module), entry.settings
     if peer is PLUMBOB_LM:
-        settings = {name: settings.get(name) for name in ("restarts", "phases")}
-        settings["prepared"] = prepared
+        settings = {key: settings.get(key) for key in ("restarts", "phases")} | call
     try:
         make_solve = module.prepare_task(arm, task, TOLERANCE, **settings)
     except UnableError as error:
@@ -84,16 +74,17 @@ def meet(
     pairs = (arm.draw(rng, count) for _ in range(2))
     requests = [TaskRequest(goal, start) for goal, start in zip(*pairs, strict=True)]
     attempt(make_solve(requests[0]))  # whatever is loaded or compiled with the first call
-    outputs = [attempt(make_solve(request)) for request in requests]
+    outputs = [[attempt(solve) for _ in range(ROUNDS)] for solve in map(make_solve, requests)]
     evaluator, no_answer = evaluator_of(name), np.full(len(arm.lower), np.inf)
-    rows = [no_answer if output.q is None else output.q for output in outputs]
+    rows = [no_answer if output.q is None else output.q for output, *_ in outputs]
     solved = [
         bool(np.isfinite(q).all()) and is_met(evaluator, task, request, q, TOLERANCE)
         for q, request in zip(rows, requests, strict=True)
     ]
-    seconds = [output.time.seconds if output.time else np.nan for output in outputs]
+    seconds = [[o.time.seconds if o.time else np.nan for o in rounds] for rounds in outputs]
     distance = np.sqrt(np.mean((np.array(rows) - middle(arm)) ** 2, axis=1))
-    return {"solved": np.array(solved), "seconds": np.array(seconds), "distance": distance}
+    times = np.median(seconds, axis=1)
+    return {"solved": np.array(solved), "seconds": times, "distance": distance}
 
 
 # What is shown.
@@ -168,6 +159,7 @@ _CAPTIONS = Captions(
     tolerance=words(TOLERANCE),
     penalty=words_in(PENALTY, "ms"),
     restarts=words(PLUMBOB_LM.first(RESTARTS).settings["restarts"]),
+    rounds=words(ROUNDS),
 )
 
 robot_tasks = _CAPTIONS.layout("robot_tasks", _rows, _summary, columns=COLUMNS, compared=2)

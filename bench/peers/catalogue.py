@@ -90,6 +90,8 @@ LOOPS = tuple(
 # Libraries that factorise.
 SUPERNODAL = Solver("supernodal", "ours")
 FACTORS = (SUPERNODAL, Solver("scipy", "SciPy's SuperLU", "SciPy"))
+# Calls of ours without preparation, beside peers that are timed on prepared objects.
+PLAIN_CALL = Solver(f"{PLUMBOB}, plain call", f"{PLUMBOB}, plain call")
 # The timing suite. Rows that are not ranked are only shown.
 COMPILED = Solver("Plumbob, compiled", "Plumbob, compiled", colour="blue")
 PREPARED = Solver("Plumbob, prepared", "Plumbob, prepared", colour="blue")
@@ -105,7 +107,7 @@ LIMIT_NAME = "limit: copying as many bytes"
 LIMIT = Solver(LIMIT_NAME, "plain copy of as many bytes", "", "ink", ranked=False)
 _BENCHMARKED = (
     *(COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, _BY_PINOCCHIO, _BY_MUJOCO),
-    *(PRESET, TIGHT, LIMIT),
+    *(PRESET, TIGHT, LIMIT, PLAIN_CALL),
 )
 
 
@@ -132,6 +134,17 @@ SINGLE_PRECISION = {peer.title: peer.precision for peer in PEERS if peer.precisi
 # Attempts beside the first where the bench starts a user's solver again.
 _RESTART_COUNT = 20
 _EXPLICIT_METHODS = ("explicit", "symplectic")
+
+
+def calls_of(peers: Iterable[Peer]) -> Iterator[tuple[str, Peer, dict[str, bool]]]:
+    """Yield each installed peer with the settings of its call, and the call's name in records.
+
+    Ours is prepared as those of others are, and then a plain call.
+    """
+    for peer in (peer for peer in peers if peer.is_installed):
+        yield (PLUMBOB if peer is PLUMBOB_LM else peer.title), peer, {}
+        if peer is PLUMBOB_LM:
+            yield PLAIN_CALL.name, peer, {"prepared": False}
 
 
 def robot_peers(solvers: Iterable[UserSolver] = ()) -> list[Peer]:

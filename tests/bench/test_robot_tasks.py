@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from table_cells import column
 
-from plumbob.bench.experiments.robot_tasks import TOLERANCE, meet, robot_tasks
+from plumbob.bench.experiments.robot_tasks import TOLERANCE, blocks, meet, robot_tasks
+from plumbob.bench.measure.block import Scale
 from plumbob.bench.peers.catalogue import PLUMBOB_LM, TASK_SOLVERS
 from plumbob.bench.peers.peer import ONE_START, RESTARTS
 from plumbob.bench.problems.evaluate import evaluator_of
@@ -66,6 +67,22 @@ def test_every_installed_solver_meets_tasks_with_restarts_or_says_why_not(name, 
     assert measured["solved"].all()
     assert (measured["seconds"] > 0.0).all()
     assert (measured["distance"] < 3.0).all()
+
+
+@pytest.mark.parametrize("kind", [ONE_START, RESTARTS])
+def test_a_plain_call_gives_the_answers_of_the_prepared_call(kind):
+    prepared, plain = (
+        meet(ARM, "axis", PLUMBOB_LM, kind, 3, 1986, **call) for call in ({}, {"prepared": False})
+    )
+    assert prepared["distance"].tolist() == plain["distance"].tolist()
+    assert prepared["solved"].tolist() == plain["solved"].tolist()
+
+
+def test_every_solver_has_a_row_and_ours_has_two():
+    made = {block.solver for block in blocks(Scale(targets=100, seconds=0.1))}
+    assert made == {"Plumbob", "Plumbob, plain call"} | {
+        peer.title for peer in TASK_SOLVERS[1:] if peer.is_installed
+    }
 
 
 def test_a_false_claim_is_not_counted_and_an_unable_solver_says_why(importable):

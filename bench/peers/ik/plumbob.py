@@ -77,8 +77,7 @@ def prepare(
 
         def ask_prepared(request: PoseRequest) -> Solve:
             target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
-            call = partial(solve, request.start, target)
-            return Solve(call, lambda o: (solve.coordinates.copy(), o == Outcome.CONVERGED))
+            return Solve(partial(solve, request.start, target), partial(_read_prepared, solve))
 
         return ask_prepared
 
@@ -107,29 +106,26 @@ def _read(solution: IKSolution | TaskSolution) -> tuple[FloatArray | None, bool]
     return solution.coordinates, solution.outcome == Outcome.CONVERGED
 
 
+def _read_prepared(solve: Any, outcome: Outcome) -> tuple[FloatArray, bool]:
+    return solve.coordinates.copy(), outcome == Outcome.CONVERGED
+
+
 def prepare_task(
-    robot: BenchRobot,
-    task: RobotTask,
-    tolerance: float,
-    restarts: int = 0,
-    phases: int | None = None,
-    prepared: bool = True,
+    robot: BenchRobot, task: RobotTask, tolerance: float, prepared: bool = True, **settings: Any
 ) -> Callable[[TaskRequest], Solve]:
-    """Return the solver of a task, set up for an arm."""
+    """Return the solver of a task, set up for an arm, with settings of `prepare_tasks`."""
     arm, base = urdf.parse(robot.text), first_link(evaluator_of(robot.name))
     # of an entry of a residual, so that its three keep it together
-    settings: dict[str, Any] = {"restarts": restarts, "phases": phases}
     settings["tolerance"] = tolerance / 3.0**0.5
 
     def make_solve(request: TaskRequest) -> Solve:
         goal = tasks.configuration(arm.articulation, request.goal)
         parts = [_task(robot, part, arm, goal, base) for part in task.parts]
         if not prepared:
-            solve = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
-            return Solve(solve, _read)
-        tasks_of_arm = prepare_tasks(arm.articulation, parts, **settings)
-        call = partial(tasks_of_arm, request.start)
-        return Solve(call, lambda o: (tasks_of_arm.coordinates.copy(), o == Outcome.CONVERGED))
+            call = partial(solve_tasks, arm.articulation, request.start, parts, **settings)
+            return Solve(call, _read)
+        solve = prepare_tasks(arm.articulation, parts, **settings)
+        return Solve(partial(solve, request.start), partial(_read_prepared, solve))
 
     return make_solve
 
