@@ -14,7 +14,7 @@ from ..measure.progress import announce
 from ..measure.record import Record
 from ..measure.timing import attempt, restarted
 from ..measure.values import Booleans1, Fact, Floats1, Values
-from ..peers.catalogue import PLUMBOB_LM, TASK_SOLVERS, calls_of
+from ..peers.catalogue import PLAIN_CALL, PLUMBOB_LM, TASK_SOLVERS, calls_of
 from ..peers.peer import ONE_START, RESTARTS, Peer
 from ..problems.evaluate import evaluator_of
 from ..problems.robot_tasks import ROBOT_TASKS, TaskRequest, is_met, middle
@@ -134,7 +134,7 @@ COLUMNS = (
     text("attempts", lambda row: row.attempts),
     text("solver", lambda row: row.solver),
     Column("solved", note=INTERVAL, best="greatest", read=lambda row: row.solved),
-    _median("time", "ms", _penalised_seconds, best="least"),
+    _median("time", "µs", _penalised_seconds, best="least"),
     text("remark", lambda row: row.records[0].values.remark),
     _median("distance", "rad", lambda values: values.distance[values.solved], folded=True),
 )
@@ -149,7 +149,8 @@ def _rows(results: Results) -> list[SolverTask]:
 def _summary(rows: Sequence[SolverTask]) -> Summary:
     points = []
     for (task, attempts), members in grouped(rows, lambda row: row[:2]).items():
-        shares = [f"{row.solver} {words(row.solved)}" for row in members if row.solved]
+        solved = {row.solver: row.solved for row in members if row.solver != PLAIN_CALL.name}
+        shares = [f"{solver} {words(share)}" for solver, share in solved.items() if share]
         points.append(f"{task}, {attempts}: {listed(shares)}")
     return listing("The share of the targets whose tasks each solver meets.", points)
 

@@ -94,11 +94,14 @@ def test_a_false_claim_is_not_counted_and_an_unable_solver_says_why(importable):
 
 def test_the_table_adds_up_the_robots(make):
     records = [make.sample("met"), make.sample("met", problem="axis/z1")]
+    plain = make.sample("met", solver="Plumbob, plain call")
     lacking = make.sample("met", solver="pink", arrays=None, notes={"remark": "has no task"})
-    table = robot_tasks(Results([*records, lacking]))
-    assert column(table, "remark") == ["", "has no task"]
-    share, none = column(table, "solved (95 % interval)")
+    table = robot_tasks(Results([*records, plain, lacking]))
+    assert column(table, "remark") == ["", "", "has no task"]
+    share, _, none = column(table, "solved (95 % interval)")
     assert (share.hits, share.total, none) == (2, 4, None)
-    assert "Plumbob 2/4" in table.summary.points[0]
-    (milliseconds,) = column(table, "time, median [ms]")[:1]
-    assert milliseconds >= 50.0, "two of four targets are missed, which count as 100 ms"
+    (point,) = table.summary.points
+    assert "Plumbob 2/4" in point
+    assert "plain call" not in point, "its answers are those of the prepared call"
+    (microseconds,) = column(table, "time, median [µs]")[:1]
+    assert microseconds >= 5e4, "two of four targets are missed, which count as 100 ms"
