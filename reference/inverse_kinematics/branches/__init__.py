@@ -283,7 +283,7 @@ def _by_search(arm: Arm, pose: CheckedTarget, count: int, seed: int, tolerance: 
     (pose,) = check_numbers([pose])
     starts = arm.articulation.random(np.random.default_rng(seed), count)
     tolerances = tolerance * arm.mechanism.reach, tolerance
-    settings = checked_settings("levenberg_marquardt", *tolerances, None, 0, 0, False, 1)
+    settings = checked_settings("levenberg_marquardt", *tolerances, 200, 0, 0, False, 1)
     ends = solve_checked(arm.articulation, starts, [pose], settings)
     is_near = (ends.residual <= tolerances[0]) & (ends.residual_rotation <= tolerances[1])
     candidates = np.ascontiguousarray(ends.coordinates[is_near][:, arm.mechanism.columns])
