@@ -133,7 +133,7 @@ class PreparedKinematics(threading.local):
             try:
                 if forward(table, local_rotations):
                     return pose
-            except TypeError:  # takes so long that later calls look first
+            except Exception:  # for other types, and so slow that later calls look first
                 self._work = functools.partial(_if_plain, forward, self._shape), table, pose
         name = coordinates_name(self._model)
         local = arguments.floats(name, local_rotations, *self._shape)

@@ -103,8 +103,8 @@ class Kernel:
     def specialise(self, *example: np.ndarray) -> Callable[..., Any]:
         """Return the kernel in force for arrays with the types of an example, on which it runs.
 
-        Compiled, it then raises a TypeError for other types, which takes 0.1 ms. A read-only
-        example lets writable arrays pass as well.
+        Compiled, it then raises a TypeError for other types, or an error of numba, which takes
+        0.1 ms. A read-only example lets writable arrays pass as well.
         """
         kernel = self.in_force
         with _specialising:
