@@ -19,9 +19,9 @@ PANEL = 64  # rows eliminated one by one before the rest is updated
 STRIP = 256  # columns updated together, so that those of a panel stay in a near cache
 
 
-def factorize(matrix, data, order, place, blocks, family, values):
+def factorize(graph, order, place, blocks, updates, data, values):
     """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
-    work, stack = np.empty(blocks.tallest * blocks.tallest), np.empty(family.highest)
+    work, stack = np.empty(blocks.tallest * blocks.tallest), np.empty(updates.highest)
     columns, starts, rows = blocks.columns, blocks.starts, blocks.rows
     local, places = np.empty(len(order), np.int32), np.empty(blocks.tallest, np.int32)
     top, filled = 0, 0
@@ -38,9 +38,9 @@ def factorize(matrix, data, order, place, blocks, family, values):
             local[first + j] = j
         for i in range(width, size):
             local[rows[starts[s] + i - width]] = i
-        add_columns(matrix, data, order, place, first, last, local, front)
-        for c in range(family.starts[s], family.starts[s + 1]):
-            child = family.children[c]
+        add_columns(graph, data, order, place, first, last, local, front)
+        for c in range(updates.starts[s], updates.starts[s + 1]):
+            child = updates.children[c]
             count = starts[child + 1] - starts[child]
             for i in range(count):
                 places[i] = local[rows[starts[child] + i]]
@@ -54,12 +54,12 @@ def factorize(matrix, data, order, place, blocks, family, values):
     return -1
 
 
-def add_columns(matrix, data, order, place, first, last, local, front):
+def add_columns(graph, data, order, place, first, last, local, front):
     """Add columns of the lower triangle of P A P' to a front."""
     for j in range(first, last):
         v, row = order[j], at(j - first)
-        for e in range(matrix.indptr[v], matrix.indptr[v + 1]):
-            i = place[at(matrix.indices[at(e)])]
+        for e in range(graph.indptr[v], graph.indptr[v + 1]):
+            i = place[at(graph.indices[at(e)])]
             if i >= j:
                 front[row, at(local[at(i)])] += data[at(e)]
 

@@ -9,16 +9,18 @@ added (Ashcraft and Grimes 1989, "The Influence of Relaxed Supernode Partitions 
 Method").
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
-from .dissection import nested_dissection
+from ..backend.compiled import Kernel
+from .dissection import Graph, nested_dissection
 
 # A merged supernode of at most so many columns may hold such a share of explicit zeros, the last
 # share if wider. The shares decide speed alone, not a digit of the factor beyond rounding.
-WIDTHS = (4, 16, 48)
-ZERO_SHARES = (0.4, 0.15, 0.05, 0.02)
+WIDTHS = np.array([4, 16, 48])
+ZERO_SHARES = np.array([0.4, 0.15, 0.05, 0.02])
 
 
 class Supernodes(NamedTuple):
@@ -39,47 +41,51 @@ class UpdateTree(NamedTuple):
     entries: int  # the number of entries of L
 
 
-def analyse(graph, order):
-    """Return the order of elimination, its inverse, the supernodes and their family.
+class SymbolicFactor(NamedTuple):
+    """The analysis of a symmetric pattern, shared by the factors of all matrices of the pattern."""
 
-    `order` lists all vertices of the graph, and is overwritten.
-    """
-    nested_dissection(graph, order)
-    parents, counts = elimination_tree(graph, order, inverse(order))
-    relabelling = postorder(parents)
-    order, parents = composed(order, relabelling), relabelled(parents, relabelling)
-    counts = composed(counts, relabelling)
-    member = fundamental(parents, counts)
-    relabelling, columns = gather(member, amalgamate(member, parents, counts))
-    order, parents = composed(order, relabelling), relabelled(parents, relabelling)
-    counts, place = composed(counts, relabelling), inverse(order)
-    blocks, family = structure(graph, order, place, columns, parents, counts)
-    return order, place, blocks, family
+    graph: Graph
+    order: np.ndarray  # of elimination
+    place: np.ndarray  # of each vertex in the order
+    blocks: Supernodes
+    updates: UpdateTree
 
 
-def inverse(order):
+def analyse(graph: Graph) -> SymbolicFactor:
+    """Order the columns and find L's pattern; a ValueError if A's is not symmetric."""
+    n, (indptr, indices) = len(graph.indptr) - 1, graph
+    pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
+    if (pattern != pattern.T).nnz:
+        raise ValueError("matrix: expected both triangles with the same pattern")
+    order = np.arange(n, dtype=np.int32)
+    _dissect(graph, order)
+    parents, counts = _elimination_tree(graph, order, inverse(order))
+    order, parents, counts = relabelled(_postorder(parents), order, parents, counts)
+    columns = fundamental(parents, counts)
+    member = np.repeat(amalgamated(columns, parents, counts), np.diff(columns))
+    relabelling = np.argsort(member, kind="stable").astype(np.int32)
+    columns = runs(np.diff(member[relabelling]) > 0, n)
+    order, parents, counts = relabelled(relabelling, order, parents, counts)
+    blocks, updates = structure(graph, order, columns, parents, counts)
+    return SymbolicFactor(graph, order, inverse(order), blocks, updates)
+
+
+def inverse(order: Any) -> Any:
     """Return the place of each vertex in an order."""
-    place = np.empty(len(order), np.int32)
-    for i in range(len(order)):
-        place[order[i]] = i
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
     return place
 
 
-def composed(values, relabelling):
-    """Return the values in another order."""
-    result = np.empty(len(values), np.int32)
-    for i in range(len(values)):
-        result[i] = values[relabelling[i]]
-    return result
+def relabelled(relabelling: Any, order: Any, parents: Any, counts: Any) -> tuple[Any, Any, Any]:
+    """Return all three for columns in another order, each before its parent."""
+    above = np.append(inverse(relabelling), np.int32(-1))[parents[relabelling]]
+    return order[relabelling], above, counts[relabelling]
 
 
-def relabelled(parents, relabelling):
-    """Return the parents after their nodes are put into another order, each before its parent."""
-    place, result = inverse(relabelling), np.empty(len(parents), np.int32)
-    for i in range(len(parents)):
-        parent = parents[relabelling[i]]
-        result[i] = place[parent] if parent >= 0 else -1
-    return result
+def runs(begins: Any, n: int) -> Any:
+    """Return where runs of columns begin, and n, from whether columns 1 to n - 1 begin a run."""
+    return np.concatenate([np.arange(min(n, 1)), np.flatnonzero(begins) + 1, [n]]).astype(np.int32)
 
 
 def elimination_tree(graph, order, place):
@@ -127,94 +133,68 @@ def entries(width, height):
     return width * height - width * (width - 1) // 2
 
 
-def fundamental(parents, counts):
-    """Return the supernode of each column, columns being in postorder."""
+def fundamental(parents: Any, counts: Any) -> Any:
+    """Return the first column of each supernode, and n, columns being in postorder."""
     n = len(parents)
-    children = np.zeros(n, np.int32)
-    for j in range(n):
-        if parents[j] >= 0:
-            children[parents[j]] += 1
-    member = np.zeros(n, np.int32)
-    for j in range(1, n):
-        chained = parents[j - 1] == j and counts[j - 1] == counts[j] + 1 and children[j] == 1
-        member[j] = member[j - 1] + (0 if chained else 1)
-    return member
+    children = np.bincount(parents[parents >= 0], minlength=n)
+    chained = (parents[:-1] == np.arange(1, n)) & (counts[:-1] == counts[1:] + 1)
+    return runs(~chained | (children[1:] != 1), n)
 
 
-def amalgamate(member, parents, counts):
-    """Return the final supernode of each supernode."""
-    count = member[-1] + 1 if len(member) > 0 else 0
-    last = np.zeros(count, np.int64)
-    width, filled = np.zeros(count, np.int64), np.zeros(count, np.int64)
-    for j in range(len(member)):
-        last[member[j]] = j
-        width[member[j]] += 1
-        filled[member[j]] += counts[j]
-    target = np.arange(count).astype(np.int32)
-    for s in range(count):  # children come before their parents
-        above = parents[last[s]]
-        if above >= 0:
-            p = member[above]
+def supernode_tree(columns: Any, parents: Any) -> tuple[Any, Any]:
+    """Return the supernode of each column, and the parent of each supernode, -1 for a root."""
+    member = np.repeat(np.arange(len(columns) - 1, dtype=np.int32), np.diff(columns))
+    return member, np.append(member, np.int32(-1))[parents[columns[1:] - 1]]
+
+
+def amalgamated(columns: Any, parents: Any, counts: Any) -> Any:
+    """Return the final supernode of each fundamental supernode."""
+    _, above = supernode_tree(columns, parents)
+    filled = np.add.reduceat(counts, columns[:-1], dtype=np.int64)
+    below = counts[columns[1:] - 1].astype(np.int64) - 1
+    return _amalgamate(above, np.diff(columns).astype(np.int64), below, filled)
+
+
+def amalgamate(above, width, below, filled):
+    """Return the final supernode of each supernode; widths and entries are overwritten."""
+    target = np.arange(len(above)).astype(np.int32)
+    for s in range(len(above)):  # children come before their parents
+        p = above[s]
+        if p >= 0:
             together = width[s] + width[p]
-            below = counts[last[p]] - 1
-            zeros = entries(together, together + below) - filled[s] - filled[p]
-            if zeros <= allowed(together) * entries(together, together + below):
+            size = entries(together, together + below[p])
+            zeros = size - filled[s] - filled[p]
+            if zeros <= ZERO_SHARES[np.searchsorted(WIDTHS, together)] * size:
                 target[s] = p
                 width[p], filled[p] = together, filled[s] + filled[p]
-    for s in range(count - 1, -1, -1):
+    for s in range(len(above) - 1, -1, -1):
         target[s] = target[target[s]]
     return target
 
 
-def allowed(width):
-    """Return the share of explicit zeros that a supernode of a width may hold."""
-    for i in range(len(WIDTHS)):
-        if width <= WIDTHS[i]:
-            return ZERO_SHARES[i]
-    return ZERO_SHARES[-1]
+def structure(
+    graph: Graph, order: Any, columns: Any, parents: Any, counts: Any
+) -> tuple[Supernodes, UpdateTree]:
+    """Return the supernodes with the rows below each, and the tree of their updates."""
+    width, below = np.diff(columns), counts[columns[1:] - 1].astype(np.int64) - 1
+    starts, (member, above) = ends(below), supernode_tree(columns, parents)
+    rows = _row_lists(graph, order, inverse(order), member, above, starts)
+    updates = below * (below + 1) // 2
+    children = np.flatnonzero(above >= 0)[::-1]
+    children = children[np.argsort(above[children], kind="stable")].astype(np.int32)
+    consumed = np.bincount(above[children], updates[children], len(above)).astype(np.int64)
+    tree = UpdateTree(
+        ends(np.bincount(above[children], minlength=len(above))),
+        children,
+        highest=int(np.cumsum(updates - consumed).max(initial=0)),
+        entries=int(entries(width, width + below).sum()),
+    )
+    return Supernodes(columns, starts, rows, int((width + below).max(initial=0))), tree
 
 
-def gather(member, target):
-    """Return an order in which merged supernodes are consecutive, and their first columns.
-
-    Subtrees stay consecutive: a supernode comes where the last of its parts came.
-    """
-    count = len(target)
-    sizes = np.zeros(count + 1, np.int32)
-    for s in member:
-        sizes[target[s] + 1] += 1
-    merged_count = 0
-    columns = np.zeros(count + 1, np.int32)
-    for s in range(count):
-        if sizes[s + 1] > 0:
-            columns[merged_count] = sizes[s]
-            merged_count += 1
-        sizes[s + 1] += sizes[s]
-    columns[merged_count] = len(member)
-    order = np.empty(len(member), np.int32)
-    for j in range(len(member)):
-        s = target[member[j]]
-        order[sizes[s]] = j
-        sizes[s] += 1
-    return order, columns[: merged_count + 1].copy()
-
-
-def structure(graph, order, place, columns, parents, counts):
-    """Return the supernodes with the rows below each, and their family."""
-    count = len(columns) - 1
-    member, above = np.empty(len(order), np.int32), np.empty(count, np.int32)
-    starts, tallest = np.zeros(count + 1, np.int64), 0
-    for s in range(count):
-        below = counts[columns[s + 1] - 1] - 1
-        starts[s + 1] = starts[s] + below
-        tallest = max(tallest, columns[s + 1] - columns[s] + below)
-        for j in range(columns[s], columns[s + 1]):
-            member[j] = s
-    for s in range(count):
-        parent = parents[columns[s + 1] - 1]
-        above[s] = member[parent] if parent >= 0 else -1
-    rows = row_lists(graph, order, place, member, above, starts)
-    return Supernodes(columns, starts, rows, tallest), family(columns, starts, above)
+def ends(lengths: Any) -> Any:
+    """Return where lists of these lengths begin, one after the other, and the end of the last."""
+    return np.append(0, np.cumsum(lengths))
 
 
 def row_lists(graph, order, place, member, above, starts):
@@ -240,25 +220,8 @@ def row_lists(graph, order, place, member, above, starts):
     return rows
 
 
-def family(columns, starts, above):
-    """Return the children of each supernode, and the sizes of the updates and of L."""
-    count, total = len(above), 0
-    eldest, children = np.zeros(count + 1, np.int64), np.empty(count, np.int32)
-    waiting, top, highest = np.zeros(count, np.int64), 0, 0
-    for s in range(count):
-        width, below = columns[s + 1] - columns[s], starts[s + 1] - starts[s]
-        update = below * (below + 1) // 2
-        total += entries(width, width + below)
-        top += update - waiting[s]
-        highest = max(highest, top)
-        if above[s] >= 0:
-            waiting[above[s]] += update
-            eldest[above[s] + 1] += 1
-    for s in range(count):
-        eldest[s + 1] += eldest[s]
-    filled = eldest.copy()
-    for s in range(count - 1, -1, -1):
-        if above[s] >= 0:
-            children[filled[above[s]]] = s
-            filled[above[s]] += 1
-    return UpdateTree(eldest, children, highest, total)
+_dissect = Kernel(nested_dissection, label="the analysis of sparse matrices")
+_elimination_tree = Kernel(elimination_tree)
+_postorder = Kernel(postorder)
+_amalgamate = Kernel(amalgamate)
+_row_lists = Kernel(row_lists)
