@@ -50,9 +50,11 @@ from .robot import (
     Quaternion,
     RobotLink,
     Vector,
+    X,
+    Y,
+    Z,
     assemble,
-    centre_of,
-    mass_of,
+    numbers_or,
     unit_quaternion,
     upright,
 )
@@ -62,8 +64,7 @@ from .xml import Element
 KINDS = ("hinge", "slide", "ball", "free")
 GENERATORS = ("replicate", "attach", "composite", "flexcomp")
 MOVING = ("body", "joint", "freejoint", *GENERATORS[1:])
-Z = (0.0, 0.0, 1.0)
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+AXES = {"x": X, "y": Y, "z": Z}
 POLYNOMIAL = (0.0, 1.0, 0.0, 0.0, 0.0)  # of a coupling, where the file gives no coefficients
 ORIENTATIONS = ("quat", "axisangle", "euler", "xyaxes", "zaxis")
 # The attributes read from a default class, by the tag of their elements.
@@ -475,7 +476,8 @@ class _Tree:
         leaves_mass = inertial is None or self.settings.from_geoms
         mass, centre = self.mass_of_geoms(geoms if leaves_mass else [])
         if inertial and mass == 0.0:
-            mass, centre = mass_of(inertial, "mass"), centre_of(inertial, "pos")
+            (mass,) = numbers_or(inertial, "mass", (math.nan,))
+            centre = numbers_or(inertial, "pos", ORIGIN)
         mass = max(mass, self.settings.smallest_mass)
         self.links[-1] = self.links[-1]._replace(mass=mass, centre=centre)
         return bodies

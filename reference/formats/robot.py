@@ -11,7 +11,7 @@ from ..articulation import Articulation, Mimic
 from ..model import Robot
 from ..quaternion import IDENTITY, between, magnitude, normalised
 from ..skeleton import Skeleton
-from .xml import Element
+from .xml import Element, Numbers
 
 # A round number far above every known robot: a hostile file ends here.
 MAX_JOINTS = 10_000
@@ -20,6 +20,7 @@ Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 ORIGIN = (0.0, 0.0, 0.0)
 INFINITY = float("inf")
+X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 class RobotLink(NamedTuple):
@@ -33,7 +34,7 @@ class RobotLink(NamedTuple):
     offset: Vector = ORIGIN
     frame: Quaternion = IDENTITY
     kind: str = "fixed"
-    axis: Vector = (0.0, 0.0, 1.0)
+    axis: Vector = Z
     lower: float = -INFINITY
     upper: float = INFINITY
     cone: float = INFINITY
@@ -54,7 +55,7 @@ def upright(axis: Vector) -> Quaternion:
     x, y, z = axis
     if z < 0.0 and max(abs(x), abs(y)) < 1e-10 * -z:
         return 0.0, 1.0, 0.0, 0.0
-    return between((0.0, 0.0, 1.0), axis)
+    return between(Z, axis)
 
 
 def assemble(
@@ -88,18 +89,9 @@ def assemble(
     return Robot(articulation, joints, home, weights, frozen(np.array(centres)))
 
 
-def mass_of(element: Element | None, name: str) -> float:
-    """Return the mass in an attribute [kg], NaN if missing."""
-    mass = (float("nan"),)
+def numbers_or(element: Element | None, name: str, default: Numbers) -> Numbers:
+    """Return the numbers in an attribute, the default if missing or invalid."""
     if element is not None:
         with contextlib.suppress(ValueError):
-            mass = element.numbers(name, mass)
-    return mass[0]
-
-
-def centre_of(element: Element | None, name: str) -> Vector:
-    """Return the centre of mass in an attribute [m], zero if missing."""
-    if element is not None:
-        with contextlib.suppress(ValueError):
-            return element.numbers(name, ORIGIN)
-    return ORIGIN
+            return element.numbers(name, default)
+    return default

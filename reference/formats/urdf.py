@@ -10,6 +10,7 @@ origin is read in files of version 1.1 or 1.2; in files of version 1.0 it is ign
 like in Pinocchio. Shapes, transmissions and safety controllers are ignored.
 """
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -25,9 +26,10 @@ from .robot import (
     ORIGIN,
     Quaternion,
     RobotLink,
+    X,
+    Y,
     assemble,
-    centre_of,
-    mass_of,
+    numbers_or,
     unit_quaternion,
     upright,
 )
@@ -48,7 +50,6 @@ CROSSED_LIMITS = ("unlimited", "ordered", "refused")
 VERSIONS = ("1.0", "1.1", "1.2")  # of URDF; quaternions are read from the second on
 LIMITED_TYPES = "revolute", "prismatic"
 SCALAR_TYPES = (*LIMITED_TYPES, "continuous")
-X, Y = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 
 
 class _Joint(NamedTuple):
@@ -151,7 +152,8 @@ def _with_mass(link: RobotLink, element: Element) -> RobotLink:
         return link
     tags = inertials[0].children_named("mass"), inertials[0].children_named("origin")
     mass, origin = (tag[0] if tag else None for tag in tags)
-    return link._replace(mass=mass_of(mass, "value"), centre=centre_of(origin, "xyz"))
+    (weight,) = numbers_or(mass, "value", (math.nan,))
+    return link._replace(mass=weight, centre=numbers_or(origin, "xyz", ORIGIN))
 
 
 def _joint(root: Element, element: Element) -> _Joint:
