@@ -337,17 +337,6 @@ class _Part(NamedTuple):
     inherited: str
 
 
-class _Joint(NamedTuple):
-    label: str
-    kind: str
-    anchor: Vector = ORIGIN
-    axis: Vector = Z
-    lower: float = -INFINITY
-    upper: float = INFINITY
-    cone: float = INFINITY
-    ref: float = 0.0
-
-
 def _robot(root: Element, origin: str) -> Robot:
     """Return the robot or character described by a <mujoco> element."""
     if root.tag != "mujoco":
@@ -465,11 +454,11 @@ class _Tree:
         inherited = self.settings.class_of(body, "childclass", part.inherited)
         tags, bodies, geoms, sites = self.parts(_Part(body, _Transform(), inherited))
         joints = [self.joint(tag, index) for index, tag in enumerate(tags)]
-        is_free = any(joint.kind == "free" for joint in joints)
+        is_free = any(joint.kind == "free" for joint, _ in joints)
         if is_free and (len(joints) > 1 or parent != 0):
             raise body.error("expected a single free joint, in a body of the world")
         for number, (joint, tag) in enumerate(zip(joints, tags, strict=True), len(self.links)):
-            self.record(tag.element, joint, f"{name}/{joint.label}", number, pose)
+            self.record(tag.element, *joint, f"{name}/{joint[0].name}", number, pose)
         self.links += _chain(name, parent, len(self.links), pose, joints)
         self.add_sites(sites, len(self.links) - 1)
         inertial = body.single("inertial")
@@ -533,8 +522,8 @@ class _Tree:
                 raise element.error("expected every body to be written out, got a rule for some")
         return parts["joint"], parts["body"], parts["geom"], parts["site"]
 
-    def joint(self, part: _Part, index: int) -> _Joint:
-        """Return a joint, the default attributes of its class included."""
+    def joint(self, part: _Part, index: int) -> tuple[RobotLink, float]:
+        """Return a joint, with its label and its anchor in the body, and its `ref`."""
         element, frame, inherited = part
         kind = "free"
         if element.tag == "joint":
@@ -547,15 +536,15 @@ class _Tree:
                 raise element.error(
                     "expected a free joint that is not aligned with the body's inertia"
                 )
-            return _Joint(label, kind)
+            return RobotLink(label, 0, kind=kind), 0.0
         anchor = frame.apply(element.numbers("pos", ORIGIN))
         angle = 1.0 if kind == "slide" else self.settings.angle
         lower, upper = (angle * limit for limit in self.limits(element, kind))
         if kind == "ball":
-            return _Joint(label, kind, anchor, Z, -upper, upper, upper)
+            return RobotLink(label, 0, anchor, IDENTITY, kind, Z, -upper, upper, upper), 0.0
         axis = rotate(frame.R, _direction(element, "axis", element.numbers("axis", Z)))
         (ref,) = element.numbers("ref", (0.0,))
-        return _Joint(label, kind, anchor, axis, lower, upper, ref=angle * ref)
+        return RobotLink(label, 0, anchor, IDENTITY, kind, axis, lower, upper), angle * ref
 
     def limits(self, joint: Element, kind: str) -> tuple[float, float]:
         """Return a joint's range, in the unit of the file."""
@@ -572,17 +561,18 @@ class _Tree:
         return lower, upper
 
     def record(
-        self, element: Element, joint: _Joint, path: str, number: int, pose: _Transform
-    ) -> None:
+        self, element: Element, joint: RobotLink, ref: float, path: str, number: int,
+        pose: _Transform,
+    ) -> None:  # fmt: skip
         """Store the index and home of a joint by its name, or without a name by its path."""
-        name = joint.label if "name" in element.attributes else path
+        name = joint.name if "name" in element.attributes else path
         if name in self.joints:
             raise element.error(f"expected a joint's name once, got {name!r:.80} twice")
         self.joints[name] = number
         if joint.kind == "free":
             self.homes[number] = (*pose.x, *pose.R)
         elif joint.kind != "ball":
-            self.homes[number] = (joint.ref,)
+            self.homes[number] = (ref,)
 
 
 def _mass_of_geom(geom: Element) -> tuple[float, Vector]:
@@ -607,27 +597,27 @@ def _mass_of_geom(geom: Element) -> tuple[float, Vector]:
 
 
 def _chain(
-    name: str, parent: int, number: int, pose: _Transform, joints: list[_Joint]
+    name: str, parent: int, number: int, pose: _Transform, joints: list[tuple[RobotLink, float]]
 ) -> list[RobotLink]:
     """Return the links of a body; the last has the name and the pose of the body.
 
     The frames of the links are at the anchors of the joints. The file states the anchors in the
     body's frame for zero coordinates, and the joints act in the order of the file.
     """
-    if joints and joints[0].kind == "free":
+    if joints and joints[0][0].kind == "free":
         return [RobotLink(name, 0, kind="free")]
     links: list[RobotLink] = []
     anchor = ORIGIN
-    for label, kind, next_anchor, axis, lower, upper, cone, ref in joints:
-        if kind != "slide":
-            pose = _Transform(pose.apply(subtract(next_anchor, anchor)), pose.R)
-            anchor = next_anchor
-        shift = scale(-ref, axis)
+    for joint, ref in joints:
+        if joint.kind != "slide":
+            pose = _Transform(pose.apply(subtract(joint.offset, anchor)), pose.R)
+            anchor = joint.offset
+        shift = scale(-ref, joint.axis)
         x, R = pose.compose(
-            _Transform(R=exponential(shift)) if kind == "hinge" else _Transform(shift)
+            _Transform(R=exponential(shift)) if joint.kind == "hinge" else _Transform(shift)
         )
-        path = f"{name}/{label}"
-        links.append(RobotLink(path, parent, x, R, kind, axis, lower, upper, cone))
+        path = f"{name}/{joint.name}"
+        links.append(joint._replace(name=path, parent=parent, offset=x, frame=R))
         parent, pose = number + len(links) - 1, _Transform()
     if links and anchor == ORIGIN:
         return [*links[:-1], links[-1]._replace(name=name)]
