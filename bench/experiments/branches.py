@@ -21,7 +21,7 @@ from ..measure.progress import announce
 from ..measure.record import Record
 from ..measure.values import Fact, Floats1, Integers1, Values
 from ..peers.axes import REVOLUTION, all_within
-from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, PLUMBOB_LM
+from ..peers.catalogue import BRANCH_SOLVERS, PLUMBOB, calls_of
 from ..peers.protocol import SolveFactory
 from ..problems.evaluate import Targets, angle_between, evaluator_of
 from ..problems.robot_targets import STRATA, robot_targets
@@ -45,6 +45,8 @@ LARGEST_COUNT = 16
 ROUNDS = 5
 # Time limit of all solvers of a robot [s].
 PATIENCE = 1800.0
+# The module of a solver's adapter, and the settings of its call.
+ListJob = tuple[str, Mapping[str, bool]]
 
 
 class BranchValues(Values, frozen=True, kw_only=True):
@@ -78,36 +80,32 @@ def blocks(scale: Scale) -> Iterator[Block]:
         if len(robot(name).joints) != HINGES:
             continue
         problem, facts = f"branches/{name}", {"task": BRANCHES, "title": title(name)}
-        for peer in (peer for peer in BRANCH_SOLVERS if peer.is_installed):
+        for solver, peer, call in calls_of(BRANCH_SOLVERS):
             settings = {"version": peer.version, "starts": STARTS, "seed": scale.seed}
-            solver = PLUMBOB if peer is PLUMBOB_LM else peer.title
-            group = Group(problem, partial(compare, name, count, scale.seed), peer.module)
+            group = Group(problem, partial(compare, name, count, scale.seed), (peer.module, call))
             measure, size = group.measure_alone, count * len(STRATA)
             yield Block(SUITE, problem, solver, measure, settings, size, facts, group=group)
 
 
-def compare(name: str, count: int, seed: int, modules: Sequence[str]) -> list[Measured]:
-    """Compare the lists of the solvers of modules with each other and with the search."""
+def compare(name: str, count: int, seed: int, jobs: Sequence[ListJob]) -> list[Measured]:
+    """Compare the lists of solvers with each other and with the search."""
     announce("all solutions, every solver")
-    results = in_a_fresh_process(PATIENCE, lists, name, modules, count, seed)
-    return [results[module] for module in modules]
+    results: Any = in_a_fresh_process(PATIENCE, lists, name, jobs, count, seed)
+    return [results[i] for i in range(len(jobs))]
 
 
-def lists(name: str, modules: Sequence[str], count: int, seed: int) -> Mapping[str, Any]:
-    """Return by module the numbers of its lists, or why the solver does not take the robot."""
+def lists(name: str, jobs: Sequence[ListJob], count: int, seed: int) -> dict[Any, Any]:
+    """Return by job the numbers of its lists, or why the solver does not take the robot."""
     targets = robot_targets(name, count, seed)
-    results: dict[str, Any] = {}
-    factories: dict[str, SolveFactory] = {}
-    for module in modules:
+    results: dict[int, Any] = {}
+    factories: dict[int, SolveFactory] = {}
+    for i, (module, call) in enumerate(jobs):
         try:
-            factories[module] = importlib.import_module(module).prepare_all(robot(name))
+            factories[i] = importlib.import_module(module).prepare_all(robot(name), **call)
         except UnableError as error:
-            results[module] = {"remark": str(error)}
+            results[i] = {"remark": str(error)}
     requests = [targets.request(i) for i in range(len(targets.starts))]
-    solves = {
-        module: [make_solve(request) for request in requests]
-        for module, make_solve in factories.items()
-    }
+    solves = {m: [*map(make_solve, requests)] for m, make_solve in factories.items()}
     rows = {m: [_within(name, solve().q) for solve in solves[m]] for m in solves}
     errors = {m: [_errors(name, targets, i, q) for i, q in enumerate(rows[m])] for m in rows}
     exact = ([q[e <= EXACT] for q, e in zip(rows[m], errors[m], strict=True)] for m in rows)
@@ -168,12 +166,12 @@ def _search(name: str, targets: Targets) -> Iterator[FloatArray]:
         yield _distinct(_within(name, ends.coordinates[is_solved]))
 
 
-def _seconds(solves: Mapping[str, Sequence[Any]]) -> dict[str, FloatArray]:
+def _seconds(solves: Mapping[int, Sequence[Any]]) -> dict[int, FloatArray]:
     """Return how long each call takes [s], the solvers in turns, in a random order each round."""
-    rng, modules = np.random.default_rng(0), list(solves)
-    seconds = {m: np.empty((ROUNDS, len(solves[m]))) for m in modules}
+    rng = np.random.default_rng(0)
+    seconds = {m: np.empty((ROUNDS, len(solves[m]))) for m in solves}
     for i in range(ROUNDS):
-        for m in rng.permutation(modules):
+        for m in rng.permutation([*solves]).tolist():
             seconds[m][i] = [solve().time.seconds for solve in solves[m]]
     return {m: np.median(times, axis=0) for m, times in seconds.items()}
 

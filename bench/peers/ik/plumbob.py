@@ -11,6 +11,7 @@ from plumbob.reference import (
     IKSolution,
     Outcome,
     Target,
+    all_solutions,
     prepare_all_solutions,
     prepare_ik,
     prepare_tasks,
@@ -91,13 +92,17 @@ def prepare(
     return make_solve
 
 
-def prepare_all(robot: BenchRobot) -> SolveFactory:
+def prepare_all(robot: BenchRobot, prepared: bool = True) -> SolveFactory:
     """Return the solver of all solutions, set up for a chain."""
-    solve = prepare_all_solutions(urdf.parse(robot.text).articulation)
+    articulation = urdf.parse(robot.text).articulation
+    solve = prepare_all_solutions(articulation)
 
     def make_solve(request: PoseRequest) -> Solve:
-        target = np.append(request.positions[0], rotation.from_matrix(request.rotations[0]))
-        return Solve(partial(solve, target), lambda s: (s.coordinates.copy(), None))
+        x, Q = request.positions[0], rotation.from_matrix(request.rotations[0])
+        call = partial(solve, np.append(x, Q))
+        if not prepared:
+            call = partial(all_solutions, articulation, Target(x, Q))
+        return Solve(call, lambda s: (s.coordinates.copy(), None))
 
     return make_solve
 
