@@ -75,9 +75,8 @@ KINDS = {BRANCHES: BranchValues}
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every installed solver on every arm of six hinges."""
     count = max(1, round(_TARGETS * scale.targets))
-    names = (name for name in ROBOTS if is_installed(name))
-    for name in (name for name in names if robot(name).is_chain):
-        if len(robot(name).joints) != HINGES:
+    for name in filter(is_installed, ROBOTS):
+        if not robot(name).is_chain or len(robot(name).joints) != HINGES:
             continue
         problem, facts = f"branches/{name}", {"task": BRANCHES, "title": title(name)}
         for solver, peer, call in calls_of(BRANCH_SOLVERS):
@@ -157,8 +156,7 @@ def _search(name: str, targets: Targets) -> Iterator[FloatArray]:
     """Yield the solutions of each target by Levenberg-Marquardt from random starts."""
     model = urdf.parse(robot(name).text).articulation
     starts = robot(name).draw(np.random.default_rng(0), STARTS)
-    limits: dict[str, Any] = {"restarts": 0, "tolerance": EXACT}
-    limits["tolerance_rotation"] = EXACT
+    limits: dict[str, Any] = {"restarts": 0, "tolerance": EXACT, "tolerance_rotation": EXACT}
     for x, R in zip(targets.positions[:, 0], targets.rotations[:, 0], strict=True):
         target = Target(x, rotation.from_matrix(R))
         ends = solve_ik(model, starts, target, "levenberg_marquardt", **limits)

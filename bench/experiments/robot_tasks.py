@@ -71,8 +71,7 @@ def meet(
     if entry.restarts:
         make_solve = restarted(make_solve, arm, entry.restarts)
     rng = np.random.default_rng([seed, seed_of(name)])
-    pairs = (arm.draw(rng, count) for _ in range(2))
-    requests = [TaskRequest(goal, start) for goal, start in zip(*pairs, strict=True)]
+    requests = [*map(TaskRequest, arm.draw(rng, count), arm.draw(rng, count))]
     attempt(make_solve(requests[0]))  # whatever is loaded or compiled with the first call
     outputs = [[attempt(solve) for _ in range(ROUNDS)] for solve in map(make_solve, requests)]
     evaluator, no_answer = evaluator_of(name), np.full(len(arm.lower), np.inf)

@@ -137,10 +137,7 @@ _EXPLICIT_METHODS = ("explicit", "symplectic")
 
 
 def calls_of(peers: Iterable[Peer]) -> Iterator[tuple[str, Peer, dict[str, bool]]]:
-    """Yield each installed peer with the settings of its call, and the call's name in records.
-
-    Ours is prepared as those of others are, and then a plain call.
-    """
+    """Yield installed peers with a name in records and settings; ours prepared, then plain."""
     for peer in (peer for peer in peers if peer.is_installed):
         yield (PLUMBOB if peer is PLUMBOB_LM else peer.title), peer, {}
         if peer is PLUMBOB_LM:

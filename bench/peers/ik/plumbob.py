@@ -86,7 +86,6 @@ def prepare(
         x, R, start = request
         quaternions = rotation.from_matrix(R) if robot.oriented else [None] * len(x)
         targets = [*map(Target, x, quaternions, robot.effectors)]
-
         return Solve(partial(solve_ik, articulation, start, targets, **settings), _read)
 
     return make_solve
