@@ -8,8 +8,13 @@ effector by w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. J J^T is 3 x 3 how
 there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`bounded_step.py`) makes
 the same iterations on a chain of ten balls, but a solve takes nine times as long.
 
-`restarts.py` iterates. A step on a mechanism keeps the limits (`bounded_step.py`). Towards a target
-out of reach damped least squares makes Newton's steps (`far_step.py`).
+- *Damping*: FIXED_DAMPING, of damped least squares alone.
+- *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
+  changes, or the iterations allowed are made.
+- *Limits*: `transposed_step` and `damped_step` of `bounded_step.py` stop freedoms at their own.
+- *Beyond reach*: a chain's target is drawn nearer (`drawn_near`). On mechanisms damped least
+  squares makes Newton's steps (`far_step.py`); the transposed Jacobian goes on as within reach.
+- *Compiled* are the kernels at the end, with all that they call.
 """
 
 from ..backend.compiled import Kernel

@@ -1,19 +1,22 @@
-"""Levenberg-Marquardt: steps by damped least squares whose damping follows the squared error.
+"""Levenberg-Marquardt: damped least squares whose damping follows the squared error.
 
 An iteration computes the errors e of the effectors and their Jacobian J. It solves
-(J J' + mu 1) z = e and changes the coordinates by J' z. The *damping* mu is a share of |e|² plus a
-bias (Sugihara 2011). Far from the target the step is short and safe; near the target convergence
-is quadratic even where the Jacobian loses rank. Every step is taken.
+(J J' + mu 1) z = e, of the size of e, and changes the coordinates by J' z.
 
-- *End*: `restarts.py` calls the update until the target is within the tolerances, the error no
-  longer changes, or the iterations allowed are made.
+- *Damping*: mu is a share of |e|² plus a bias (Sugihara 2011). Far from the target the step is
+  short and safe; near the target convergence is quadratic even where the Jacobian loses rank.
+- *Acceptance*: every step is taken. Only where the errors cannot vanish, as of a posture, a step
+  has to lower them (`descent.py`).
+- *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
+  changes, or the iterations allowed are made. A start that stalls, mostly at limits, is followed by
+  further starts.
 - *Limits*: `damped_step` of `bounded_step.py` stops freedoms at their limits and solves for the
   others again.
 - *Beyond reach*: `step_towards` makes Newton's steps to the nearest pose (`far_step.py`).
-- *Stalls*, mostly at limits: `restarts.py` tries further starts.
 - *Compiled* are the two kernels at the end, with all that they call.
 
-A chain of unlimited balls with one position has a form of its own, see `jacobian.py`.
+`levenberg_marquardt_sweep` is the same on a chain of unlimited balls with one position, where J J'
+has closed entries (`jacobian.py`).
 """
 
 from ..backend.compiled import Kernel
