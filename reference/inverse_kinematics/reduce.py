@@ -120,7 +120,7 @@ def random_poses(articulation: Articulation, count: int, seed: int) -> FloatArra
 def further_shares(joints: int) -> FloatArray:
     """Return the shares of the joints' ranges at further starts, (FURTHER_STARTS, joint).
 
-    They fill the middle of a cube evenly: Roberts' additive recurrence (2018), whose step along
+    They fill the middle of a cube evenly, by an additive recurrence (Roberts 2018). Its step along
     axis i is phi^-i, where phi^(joint + 1) = phi + 1. The first is the centre.
     """
     phi = 2.0
