@@ -95,7 +95,7 @@ class PreparedTasks(threading.local):
     ) -> None:
         """Allocate the arrays of a thread; `prepare_tasks` checks the arguments."""
         self._problem = model, tasks, settings
-        kinds = [task.kind if isinstance(task, BuiltInTask) else OWN for task in tasks]
+        kinds = [_kind(task) for task in tasks]
         factors = [_factors(model, task) for task in tasks]
         restarts, shares = random_poses(model, *settings[2:4]), further_shares(model.joint_count)
         shares = shares[: settings[4] - 1]
@@ -269,9 +269,15 @@ def _as_task(model: Articulation, task: IKTask | Target) -> IKTask:
     return task
 
 
+def _kind(task: IKTask) -> int:
+    """Return the kind of a task; a subclass with an `evaluate` of its own is a task of a user."""
+    is_built_in = getattr(type(task), "evaluate", None) is BuiltInTask.evaluate
+    return task.kind if isinstance(task, BuiltInTask) and is_built_in else OWN
+
+
 def _factors(model: Articulation, task: IKTask) -> FloatArray:
     """Return the factors of the residual; a task of a user is evaluated once for its size."""
-    if isinstance(task, BuiltInTask):
+    if isinstance(task, BuiltInTask) and _kind(task) != OWN:
         return task.factors(model)
     residual, _ = _evaluated(task, configuration(model, model.neutral()), "row")
     return np.ones(len(residual))

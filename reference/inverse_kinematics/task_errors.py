@@ -115,7 +115,7 @@ def task_arrays(
                 arrays.coordinates[t] = model.checked(name, attribute)
             elif name in ("masses", "centres", "coefficients"):
                 getattr(arrays, name)[t, : len(attribute)] = attribute
-            elif name != "axes":
+            elif name in record.dtype.names:
                 record[name] = attribute
     return arrays
 

@@ -64,6 +64,28 @@ def test_a_task_of_a_user_makes_the_iterations_of_the_kernel(name, exact):
         np.testing.assert_allclose(solution.errors, expected.errors, atol=ROUNDING)
 
 
+class Noted(tasks.FrameTask):
+    """A task of Plumbob with an attribute more, and perhaps an `evaluate` of its own."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        self.__dict__["note"] = "mine"
+
+
+class Lowered(Noted):
+    def evaluate(self, configuration):
+        r, J = super().evaluate(configuration)
+        return r - (0.0, 0.0, 0.1), J
+
+
+@pytest.mark.parametrize(("kind", "height"), [(Noted, 0.0), (Lowered, 0.1)])
+def test_a_subclass_of_a_task_is_evaluated_by_its_own_method(kind, height):
+    model, (x, _) = arm(), pose_of(arm(), 1)
+    solution = solve_tasks(model, model.neutral(), [kind(7, 0.9 * x)])
+    end = model.forward(solution.coordinates)[0][7]
+    np.testing.assert_allclose(end, 0.9 * x + (0.0, 0.0, height), atol=2e-4)
+
+
 def body(model):
     """Return a task of each kind with a target, and its arguments of another target."""
     masses, centres, q = np.ones(8), np.full((8, 3), 0.05), model.random(np.random.default_rng(3))
