@@ -119,7 +119,7 @@ def run(
     n = len(targets) // (3 if is_chain else TARGET_WIDTH * len(problem.effectors))
     columns = 1
     if settings.record:  # a chain leaves room for the restarts of its mechanism
-        rounds = limits.restarts * (3 if is_chain else 2) + 2
+        rounds = (1 + limits.restarts) * (4 if is_chain and limits.restarts else 2)
         columns += rounds * max(limits.max_iterations, limits.far_iterations)
         if n * columns > LARGEST_HISTORY:
             raise ValueError(
@@ -235,8 +235,7 @@ def _restart(
     counts = first.figures[unsolved, ITERATIONS].astype(np.int64)
     if settings.record:  # the residuals of the first results, then those of their restarts
         for row, count, residuals in zip(unsolved, counts, more.history, strict=True):
-            history = first.history[row, count + 1 :]
-            history[:] = residuals[1 : 1 + len(history)]
+            first.history[row, count + 1 : count + len(residuals)] = residuals[1:]
     iterations = counts + more.figures[:, ITERATIONS]
     is_better = (more.figures[:, OUTCOME] == Outcome.CONVERGED) | (
         more.figures[:, MERIT] < first.figures[unsolved, MERIT]
