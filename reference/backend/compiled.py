@@ -35,7 +35,7 @@ BACKENDS = ("numba", "python")
 # Optimisations allowed for relaxed kernels; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # Names in kernels that make arrays, or views that a kernel returns.
-ALLOCATING = {"np", "copy", "reshape", "view"}
+ALLOCATING = {"np", "copy", "reshape"}
 # The largest size of callees always inlined, in the interpreter's instructions.
 INLINED_SIZE = 5000
 # The interpreter's instructions that read a global.
@@ -212,7 +212,8 @@ def _jit(kernel: PythonKernel, relaxed: bool, inlined_size: int, **options: Any)
         if _kernels_in(value) and value is not kernel
     }
     result = rebuilt(kernel, **compiled_globals)
-    result.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{'_relaxed' * relaxed}"
+    flags = f"{'_relaxed' * relaxed}{'_uncounted' * ('_nrt' in options)}"  # the cache tells apart
+    result.__qualname__ = f"{kernel.__qualname__}_{digest(kernel)}{flags}"
     options |= {"error_model": "numpy", "no_cfunc_wrapper": True}
     return numba.njit(fastmath=RELAXATIONS if relaxed else False, **options)(result)
 
