@@ -315,6 +315,14 @@ class Articulation(KeepsReadOnly):
         return f"Articulation({self.joint_count} joints, {self.freedom_count} degrees of freedom)"
 
 
+def balls(skeleton: Skeleton) -> Articulation:
+    """Return the skeleton as an Articulation of unlimited balls, cached by the skeleton."""
+    cache = skeleton.__dict__
+    if "balls" not in cache:
+        cache["balls"] = Articulation(skeleton, "ball")
+    return cache["balls"]
+
+
 def one_batch(values: np.ndarray, axes: int = 1) -> np.ndarray:
     """Return a view with all leading axes joined, but for the last `axes`."""
     return values.reshape(math.prod(values.shape[:-axes]), *values.shape[-axes:])

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from . import arguments
-from .arguments import FloatArray
+from .arguments import FloatArray, IndexArray
 from .articulation import (
     BALL,
     FIXED,
@@ -27,6 +27,8 @@ from .articulation import (
     SLIDE,
     Articulation,
     articulated_pose,
+    balls,
+    normalise_start,
     one_batch,
 )
 from .backend.compiled import Kernel
@@ -59,17 +61,24 @@ def jacobian(articulation: Model, q: ArrayLike, effector: int | str | None = Non
     `solve_ik`.
     """
     joint = effector_of(checked_model(articulation, "articulation"), effector)
-    return jacobians(articulation, q, [joint])[..., 0, :, :]
+    return _jacobians(articulation, q, np.array([joint]))[..., 0, :, :]
 
 
 def jacobians(articulation: Model, q: ArrayLike, joints: ArrayLike | None = None) -> FloatArray:
     """Return the Jacobians of all joints, or of `joints` only, (..., joint, 6, freedom)."""
-    model, coordinates = _coordinates("q", articulation, q)
-    count = model.joint_count
-    effectors = np.arange(count) if joints is None else joints
-    effectors = arguments.indices("joints", effectors, "joint", minimum=0, below=count)
+    count = checked_model(articulation, "articulation").joint_count
+    if joints is None:
+        return _jacobians(articulation, q, np.arange(count))
+    effectors = arguments.indices("joints", joints, "joint", minimum=0, below=count)
+    return _jacobians(articulation, q, effectors)
+
+
+def _jacobians(articulation: Model, q: ArrayLike, effectors: IndexArray) -> FloatArray:
+    model, coordinates = _rows("q", articulation, q)
     J = np.zeros((*coordinates.shape[:-1], len(effectors), 6, model.freedom_count))
-    _fill(model.joints, effectors, one_batch(coordinates), one_batch(J, 3))
+    if not _fill(model.joints, effectors, one_batch(coordinates), one_batch(J, 3)):
+        # raise, or the lengths were within rounding of the tolerance
+        return _jacobians(model, model.checked("q", coordinates), effectors)
     return J
 
 
@@ -198,12 +207,17 @@ def rotation_between(q1, q0, at):
 
 
 def _jacobians_batch(joints, effectors, q, J):
-    count = len(joints)
+    count, unit = len(joints), np.empty(q.shape[1])
     positions, rotations = np.empty((count, 3)), np.empty((count, 4))
     for i in range(len(q)):
-        articulated_pose(joints, q[i], positions, rotations)
+        for k in range(len(unit)):
+            unit[k] = q[i, k]
+        if not normalise_start(joints, unit):
+            return False
+        articulated_pose(joints, unit, positions, rotations)
         for k in range(len(effectors)):
             fill_jacobian(joints, effectors[k], positions, rotations, J[i, k])
+    return True
 
 
 def _integrate_batch(joints, v, q):
@@ -225,9 +239,14 @@ _difference = Kernel(_difference_batch)
 
 def _coordinates(name: str, articulation: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:
     """Return the articulation, and its coordinates checked, (..., coordinate)."""
+    model, rows = _rows(name, articulation, q)
+    return model, model.checked(name, rows)
+
+
+def _rows(name: str, articulation: Model, q: ArrayLike) -> tuple[Articulation, FloatArray]:
+    """Return the articulation, and its coordinates, their numbers unchecked."""
     model = checked_model(articulation, "articulation")
     if isinstance(model, Articulation):
-        return model, model.checked(name, q)
-    balls = Articulation(model)
+        return model, arguments.floats(name, q, "...", model.coordinate_count)
     local = arguments.floats(name, q, "...", model.joint_count, 4)
-    return balls, balls.checked(name, local.reshape(*local.shape[:-2], balls.coordinate_count))
+    return balls(model), local.reshape(*local.shape[:-2], 4 * model.joint_count)

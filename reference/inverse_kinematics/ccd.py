@@ -1,19 +1,20 @@
 """Cyclic coordinate descent (Wang & Chen 1991).
 
 A sweep gives each joint, from the effector to the root, the angle that brings the effector nearest:
-`ccd_sweep` on a chain of unlimited balls, `ccd_update` on mechanisms. Anderson's acceleration
-(`anderson.py`) combines the last sweeps.
+`ccd_sweep` on a chain of unlimited balls, `ccd_update` on mechanisms. A joint with followers goes
+down the gradient. The solver `anderson_ccd` combines the last sweeps (`anderson.py`).
 
 - *Damping*: there is none.
-- *End*: `restarts.py` repeats sweeps until the target is within the tolerance, the error no longer
-  changes, or the iterations allowed are made.
-- *Limits*: `move_by` stops a hinge or slide at its own, `rotate_within_limits` a ball.
-- *Beyond reach* a chain straightens slowly. Near the straight pose CCD is the method of Gauss and
-  Seidel on a Hessian of r_i r_k + g r_min(i, k). Here r are the arms of the joints, r_min the
-  shorter arm, and g the gap to the target. The first term has rank one, so n - 1 directions of n
-  joints rest on the second. A smaller gap and a longer chain need more sweeps. To 1e-4 of the reach
-  10 balls take 88 where g is the reach, and 1,340 for a fiftieth of that, 58 with acceleration.
-- *Compiled* are the kernels at the end, with all that they call.
+- *End*: `restarts.py` repeats sweeps until the target is within the tolerances, the error no longer
+  changes, or the iterations allowed are made. Of a target out of reach the nearest point counts.
+- *Limits*: `move_by` stops a hinge or slide at its own, `rotate_within_limits` a ball; combined
+  sweeps are clamped.
+- *Beyond reach* sweeps go on as within reach, and straighten a chain slowly. To 1e-4 of the reach
+  ten balls take 88 where the gap is the reach, and 1,340 for a fiftieth of that, 58 with
+  acceleration. Near the straight pose CCD is the method of Gauss and Seidel on a Hessian of
+  r_i r_k + g r_ik: r_i is the arm of joint i, r_ik the shorter of two arms, and g the gap. The
+  first term has rank one, so all directions but one rest on the gap.
+- *Compiled* are the kernels at the end, with all that they call, by numba from this source.
 """
 
 import math

@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from .. import arguments
 from ..arguments import BoolArray, FloatArray, IndexArray
-from ..articulation import BALL, FREE, FREEDOMS, HINGE, LIMIT_TOLERANCE, SLIDE, Articulation
+from ..articulation import Articulation, BALL, FREE, FREEDOMS, HINGE, LIMIT_TOLERANCE, SLIDE, balls
 from ..implicit_euler.certificate import kantorovich_distance
 from ..jacobians import difference, integrate, jacobians
 from ..model import Model, checked_model, coordinates_name
@@ -39,7 +39,7 @@ from .problem import (
     checked_targets,
 )
 from .reach import UNIT, least_distance
-from .solve import balls, solve_checked
+from .solve import solve_checked
 
 # Roundings of UNIT by a joint: of its quaternion, and of its offset; see docs/certificates.md.
 QUATERNION_ROUNDINGS, OFFSET_ROUNDINGS = 48, 130

@@ -1,7 +1,7 @@
 """Tasks: exact tasks are met by Levenberg-Marquardt, the others approached as far as these allow.
 
-The exact tasks are met as `solve_ik` reaches its targets: the same steps and damping, phases and
-restarts (`restarts.py`). Then an augmented Lagrangian (Rockafellar 1973) holds the exact tasks
+The exact tasks are met as `solve_ik` reaches its targets: by the same bounded steps and loops, in
+phases and restarts (`restarts.py`), with a smaller share of the squared error as damping. Then an augmented Lagrangian (Rockafellar 1973) holds the exact tasks
 while the sum of squares of the others falls: multipliers u shift the exact residuals r. Where the
 minimum of the sum of squares of r + u and of the other residuals does not meet the exact tasks, u
 grows by r. Here the squares have minima other than zero, so a step counts only if they fall, and

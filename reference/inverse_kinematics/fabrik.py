@@ -3,17 +3,17 @@
 A chain of unlimited balls is solved as in the paper, by positions alone (`fabrik_sweep`). On
 mechanisms (`fabrik_update`) the backward pass gives each joint a backward position. The forward
 pass does not move points: joints rotate and translate to bring their children nearest to the
-children's backward positions. A hinge rotates about its axis, a ball within its limits, and a free
+children's backward positions, and effectors further below to their targets. A hinge rotates about its axis, a ball within its limits, and a free
 joint moves as a body; all children of a branch share a rotation. A joint with followers goes down
 the gradient. The remaining distances are the residual.
 
 - *Damping*: there is none.
-- *End*: `restarts.py` repeats passes until the target is within the tolerance, the error no longer
-  changes, or the iterations allowed are made.
-- *Limits*: `move_by` and `rotate_to` stop each joint at its own.
+- *End*: `restarts.py` repeats passes until the target is within the tolerances, the error no longer
+  changes, or the iterations allowed are made. Of a target out of reach the nearest point counts.
+- *Limits*: `move_by` and `rotate_to` stop each joint at its own, also a joint with followers.
 - *Beyond reach*: `lay_on_line` straightens a chain in a single pass. A mechanism goes on as within
   reach.
-- *Compiled* are the two kernels at the end, with all that they call.
+- *Compiled* are the two kernels at the end, with all that they call, by numba from this source.
 """
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_in_world, joint_transform

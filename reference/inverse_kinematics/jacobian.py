@@ -8,13 +8,15 @@ effector by w_k x r_k: J_k w = w x r_k and J_k^T z = r_k x z. J J^T is 3 x 3 how
 there are: sum over k of |r_k|^2 1 - r_k r_k^T. The form for mechanisms (`bounded_step.py`) makes
 the same iterations on a chain of ten balls, but a solve takes nine times as long.
 
-- *Damping*: FIXED_DAMPING, of damped least squares alone.
+- *Damping*: FIXED_DAMPING, the square of a tenth of the reach, of damped least squares alone.
 - *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
-  changes, or the iterations allowed are made.
-- *Limits*: `transposed_step` and `damped_step` of `bounded_step.py` stop freedoms at their own.
+  changes, or the iterations allowed are made. Of a target out of reach the nearest point counts.
+- *Limits*: steps stop hinges and slides at their own and leave the rest to the other joints;
+  `take_step` clamps balls (`bounded_step.py`).
 - *Beyond reach*: a chain's target is drawn nearer (`drawn_near`). On mechanisms damped least
-  squares makes Newton's steps (`far_step.py`); the transposed Jacobian goes on as within reach.
-- *Compiled* are the kernels at the end, with all that they call.
+  squares makes Newton's steps with a damping of their own (`far_step.py`); the transposed Jacobian
+  goes on as within reach.
+- *Compiled* are the kernels at the end, with all that they call, by numba from this source.
 """
 
 from ..backend.compiled import Kernel
@@ -124,7 +126,7 @@ def times(A, v):
 
 
 def solve_damped(A, damping, b):
-    """Return z of (A + damping 1) z = b, A positive semidefinite, by Cholesky's factors."""
+    """Return z of (A + damping 1) z = b, A positive semidefinite, by the factors L D L'."""
     xx, yy, zz, xy, xz, yz = A
     d0 = xx + damping
     l10, l20 = xy / d0, xz / d0

@@ -4,19 +4,21 @@ An iteration computes the errors e of the effectors and their Jacobian J. It sol
 (J J' + mu 1) z = e, of the size of e, and changes the coordinates by J' z.
 
 - *Damping*: mu is a share of |e|² plus a bias (Sugihara 2011). Far from the target the step is
-  short and safe; near the target convergence is quadratic even where the Jacobian loses rank.
+  short and safe; near the target convergence is quadratic. ROUNDING_DAMPING keeps factors above
+  rounding.
 - *Acceptance*: every step is taken. Only where the errors cannot vanish, as of a posture, a step
   has to lower them (`descent.py`).
 - *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
-  changes, or the iterations allowed are made. A start that stalls, mostly at limits, is followed by
-  further starts.
-- *Limits*: `damped_step` of `bounded_step.py` stops freedoms at their limits and solves for the
-  others again.
-- *Beyond reach*: `step_towards` makes Newton's steps to the nearest pose (`far_step.py`).
-- *Compiled* are the two kernels at the end, with all that they call.
+  changes, or the iterations allowed are made. Of a target out of reach the nearest point counts. On
+  mechanisms a start that stalls or hardly progresses is followed by further starts.
+- *Limits*: `step_towards` stops hinges and slides at their limits and solves for the others again;
+  `take_step` clamps balls (`bounded_step.py`).
+- *Beyond reach*: on mechanisms `step_towards` makes Newton's steps to the nearest pose, with a
+  damping of their own (`far_step.py`). A chain's target is drawn to the nearest point in reach.
+- *Compiled* are the two kernels at the end, with all that they call, by numba from this source.
 
-`levenberg_marquardt_sweep` is the same on a chain of unlimited balls with one position, where J J'
-has closed entries (`jacobian.py`).
+`levenberg_marquardt_sweep` is the form for a chain of unlimited balls with one position, where
+J J' has closed entries (`jacobian.py`).
 """
 
 from ..backend.compiled import Kernel

@@ -5,7 +5,8 @@ The loops work on the state of a chain of unlimited balls (`solve_chain.py`) or 
 which an attempt continues.
 
 Attempts are the plain attempt from the start, then random *restarts*. A solver with *phases* makes
-another round: from the start, and from further starts that are always the same.
+another round: from the start, and from further starts that are always the same. Without restarts
+there are the phases alone.
 """
 
 import math
@@ -61,7 +62,7 @@ class Operations(NamedTuple):
 
 
 class Limits(NamedTuple):
-    """The tolerances and numbers of iterations of a solve."""
+    """The tolerances and numbers of iterations of a solve; limits of joints are the model's."""
 
     tolerance: float  # distance that counts as reached [m]
     tolerance_rotation: float  # angle that does [rad]
@@ -75,11 +76,13 @@ class Limits(NamedTuple):
 class Criteria(NamedTuple):
     """The end criteria of attempts at a target, and the number of attempts."""
 
-    # distance from the target that counts as reached [m], less the rounding of the final pose
+    # distance from the target that counts as reached [m], less the rounding of the final pose; of a
+    # target out of reach beyond the least distance that geometry allows
     distance: float
     angle: float  # the same for rotations [rad]
     margin: float  # an error that changes by no more has stalled [m]
-    max_iterations: int  # of an attempt from a random configuration, and of all from the start
+    # of an attempt from the start or a random configuration, and of all phases together
+    max_iterations: int
     restarts: int  # attempts from random configurations
     phases: int  # attempts from the start and from further starts, 1 of a plain method
     extensions: int  # times that the plain attempt has as many iterations again, without phases
@@ -118,7 +121,7 @@ def solve_with_restarts(operations, state, search, target, criteria, history):
     worse than with fewer restarts.
 
     Returns:
-        The iterations of all attempts, and whether the best of them stalled.
+        The iterations of all attempts, and whether the best of them has ended by itself.
     """
     begin_search(operations, state, search, target, criteria)
     distance, _, _, _ = operations.error(state, target)
@@ -218,7 +221,7 @@ def most_promising(search, criteria, extensions):
 
 
 def extend_first(operations, state, search, criteria, extensions):
-    """Go on from the start with as many iterations again; return whether they are allowed."""
+    """Go on with the first attempt for as many iterations again; return whether this is allowed."""
     first = search.attempts[0]
     first["patience"] = INFINITY
     resume(operations, state, search, 0)
@@ -261,7 +264,7 @@ def go_on(operations, state, search, k, target, criteria, allowed, history):
 
 
 def solve_once(operations, state, target, criteria, attempt, allowed, history, earlier):
-    """Update until the target is reached, the error stalls, or all iterations allowed are made.
+    """Update until the target is reached, progress ends, or all iterations allowed are made.
 
     The end is noted in the attempt; all attempts have made `earlier` iterations so far.
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from .. import arguments, rotation
 from ..arguments import LARGEST_COORDINATE, FloatArray, frozen
-from ..articulation import Articulation
+from ..articulation import Articulation, balls
 from ..backend.threads import in_slices
 from ..model import coordinates_name
 from ..outcome import Outcome
@@ -176,14 +176,6 @@ def _refusal(
     if settings.limits.chained:
         return FloatingPointError(f"track: a frame left the numbers up to {LARGEST_COORDINATE:g}")
     return ValueError(f"{name}: expected quaternions within 1e-6 of unit length, got one just off")
-
-
-def balls(skeleton: Skeleton) -> Articulation:
-    """Return the skeleton as an Articulation of unlimited balls, cached by the skeleton."""
-    cache = skeleton.__dict__
-    if "balls" not in cache:
-        cache["balls"] = Articulation(skeleton, "ball")
-    return cache["balls"]
 
 
 def target_rows(targets: list[CheckedTarget], batch: tuple[int, ...]) -> FloatArray:

@@ -90,7 +90,7 @@ class MechanismState(NamedTuple):
 
     mechanism: Mechanism  # what moves
     data: ConfigurationData  # its configuration
-    row: FloatArray  # the coordinates of this configuration
+    row: FloatArray  # its coordinates, `data.q`
     far_step: RecordArray  # the last step towards a target out of reach, FAR_STEP, (1,)
     mixing: Mixing  # the last sweeps, of an accelerated solver
     workspace: Workspace  # of the solver
@@ -123,7 +123,8 @@ def solve_mechanisms(operations, depth, problem, numbers, starts, targets, resul
         numbers: of Limits.
         starts: coordinates of the articulation, of one start or of as many as targets, row after
             row.
-        targets: records TARGET as numbers, (target, effector, 8), made unit here.
+        targets: records TARGET, made unit here, as numbers: target after target, effector after
+            effector.
         results: see `result_on`.
         first: index of the first target.
         last: index behind the last.
@@ -188,7 +189,7 @@ def new_workspace(mechanism):
 
 
 def scale_lengths(mechanism, scale):
-    """Divide coordinates in metres by the reach, to compare sweeps."""
+    """Fill the factors of coordinates to compare sweeps: of metres one over the reach."""
     joints = mechanism.joints
     for j in range(len(joints)):
         at, kind = joints["coordinate"][j], joints["kind"][j]
@@ -257,7 +258,7 @@ def place_mechanism(state):
 
 
 def draw_mechanism(state, target, criteria, n):
-    """Bring the mechanism to the random configuration with the n-th nearest effectors.
+    """Write the random configuration with the n-th nearest effectors to the row.
 
     With several limbs, only limbs whose effectors fail go to a random configuration, the n-th; the
     joints that limbs share do so every other time.
@@ -271,7 +272,7 @@ def draw_mechanism(state, target, criteria, n):
 
 
 def redraw_limbs(state, target, criteria, n):
-    """Copy from restart n the coordinates of joints that move effectors away from their targets."""
+    """Copy from restart n the coordinates of joints whose effectors miss their targets."""
     mechanism, q, restart = state.mechanism, state.data.q, state.restarts[n - 1]
     joints = mechanism.joints
     for j in range(len(joints)):
@@ -330,7 +331,7 @@ def take_nearest(state, q):
 
 
 def shift_mechanism(state, n):
-    """Bring the mechanism from the start to further start n, within the limits.
+    """Change the row from the start to further start n, within the limits.
 
     Each hinge or slide with two limits goes to a share of its range, the same for every start. A
     hinge without limits turns by this share of a circle; all other joints stay. The first further
