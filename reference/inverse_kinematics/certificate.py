@@ -23,7 +23,7 @@ from numpy.typing import ArrayLike
 
 from .. import arguments
 from ..arguments import BoolArray, FloatArray, IndexArray
-from ..articulation import Articulation, BALL, FREE, FREEDOMS, HINGE, LIMIT_TOLERANCE, SLIDE, balls
+from ..articulation import BALL, FREE, FREEDOMS, HINGE, LIMIT_TOLERANCE, SLIDE, Articulation, balls
 from ..implicit_euler.certificate import kantorovich_distance
 from ..jacobians import difference, integrate, jacobians
 from ..model import Model, checked_model, coordinates_name

@@ -1,11 +1,12 @@
 """Tasks: exact tasks are met by Levenberg-Marquardt, the others approached as far as these allow.
 
 The exact tasks are met as `solve_ik` reaches its targets: by the same bounded steps and loops, in
-phases and restarts (`restarts.py`), with a smaller share of the squared error as damping. Then an augmented Lagrangian (Rockafellar 1973) holds the exact tasks
-while the sum of squares of the others falls: multipliers u shift the exact residuals r. Where the
-minimum of the sum of squares of r + u and of the other residuals does not meet the exact tasks, u
-grows by r. Here the squares have minima other than zero, so a step counts only if they fall, and
-the damping follows the gain (Nielsen 1999).
+phases and restarts (`restarts.py`), with a smaller share of the squared error as damping. Then an
+augmented Lagrangian (Rockafellar 1973) holds the exact tasks while the sum of squares of the others
+falls: multipliers u shift the exact residuals r. Where the minimum of the sum of squares of r + u
+and of the other residuals does not meet the exact tasks, u grows by r. Here the squares have minima
+other than zero, so a step counts only if they fall, and the damping follows the gain (Nielsen
+1999).
 
 The loops are compiled for the tasks of Plumbob. With tasks of a user the interpreter runs the same
 loops, on compiled steps.

@@ -3,9 +3,9 @@
 A chain of unlimited balls is solved as in the paper, by positions alone (`fabrik_sweep`). On
 mechanisms (`fabrik_update`) the backward pass gives each joint a backward position. The forward
 pass does not move points: joints rotate and translate to bring their children nearest to the
-children's backward positions, and effectors further below to their targets. A hinge rotates about its axis, a ball within its limits, and a free
-joint moves as a body; all children of a branch share a rotation. A joint with followers goes down
-the gradient. The remaining distances are the residual.
+children's backward positions, and effectors further below to their targets. A hinge rotates about
+its axis, a ball within its limits, and a free joint moves as a body; all children of a branch share
+a rotation. A joint with followers goes down the gradient. The remaining distances are the residual.
 
 - *Damping*: there is none.
 - *End*: `restarts.py` repeats passes until the target is within the tolerances, the error no longer

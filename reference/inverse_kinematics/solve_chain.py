@@ -112,7 +112,7 @@ def chain_error(chain, target):
 
 
 def perturb_chain(chain, target, criteria, first):
-    """Bend a chain that starts collinear with its target: CCD and FABRIK would not leave the line."""
+    """Bend a chain that starts collinear with its target: CCD and FABRIK would stay on the line."""
     if first["iterations"] > 0 or effector_error(chain, target) <= criteria.distance:
         return False
     if is_beyond_reach(chain, root_distance(chain, target)) or not is_collinear(chain, target):
