@@ -61,7 +61,7 @@ def reaching(
     return reach
 
 
-@dataclass
+@dataclass(eq=False)
 class PhaseAttempt:
     """An attempt from one of several starts."""
 
@@ -73,7 +73,8 @@ class PhaseAttempt:
 class PhasedReach:
     """A library's task loop in the phases of our Levenberg-Marquardt, see `restarts.py`.
 
-    A phase is the library's plain loop from the start, or from one of our further starts.
+    A phase is the library's plain loop from the start, or from one of our further starts. An
+    exception ends its phase only, as in restarts.
     """
 
     def __init__(
@@ -95,38 +96,44 @@ class PhasedReach:
         self.compute_error = library(task.compute_error)
 
     def __call__(self, targets: Sequence[Any], start: FloatArray) -> bool:
-        """Step from the starts to the only target; return whether the effector arrives."""
-        self.task.set_target(*targets)
-        attempts, count = [PhaseAttempt(q) for q in (start, *self.further_starts)], self.iterations
-        while True:
-            attempt = min(attempts, key=lambda a: (a.patience, a.error))
-            self.configuration.update(attempt.q)
-            attempt.error, steps = self.go_on(count, attempt.patience)
-            count -= steps
-            if attempt.error == 0.0 or count <= 0:
-                return attempt.error == 0.0
-            attempt.q, attempt.patience = (
-                self.configuration.q.copy(), MORE_PATIENT * attempt.patience
-            )  # fmt: skip
+        """Step from the starts to the only target; return whether the effector arrives.
 
-    def go_on(self, count: int, patience: float) -> tuple[float, int]:
-        """Step until the target is reached or progress ends; return the error, 0 there, and steps.
-
-        There are `count` steps at most.
+        Raises:
+            Exception: the first of the library, if the effector arrives in no phase.
         """
+        self.task.set_target(*targets)
+        attempts = [PhaseAttempt(q) for q in (start, *self.further_starts)]
+        self.steps_left, exceptions = self.iterations, list[Exception]()
+        while attempts and self.steps_left > 0:
+            attempt = min(attempts, key=lambda a: (a.patience, a.error))
+            try:
+                self.go_on(attempt)
+            except Exception as exception:
+                attempts.remove(attempt)
+                exceptions.append(exception)
+            else:
+                if attempt.error == 0.0:
+                    return True
+        if exceptions:
+            raise exceptions[0]
+        return False
+
+    def go_on(self, attempt: PhaseAttempt) -> None:
+        """Step until the target is reached, where the error is 0, or progress or steps end."""
+        self.configuration.update(attempt.q)
         milestone, since = np.inf, 0
-        for k in range(count + 1):
-            e = self.compute_error(self.configuration)
-            error, limits = hypot(*e), self.tolerance
-            if hypot(*e[:3]) <= limits.position and hypot(*e[3:]) <= limits.rotation:
-                return 0.0, k
+        while True:
+            e, limits = self.compute_error(self.configuration), self.tolerance
+            is_reached = hypot(*e[:3]) <= limits.position and hypot(*e[3:]) <= limits.rotation
+            attempt.error = 0.0 if is_reached else hypot(*e)
             since += 1
-            if error < PROGRESS * milestone:
-                milestone, since = error, 0
-            if k == count or since >= patience:
+            if attempt.error < PROGRESS * milestone:
+                milestone, since = attempt.error, 0
+            if is_reached or since >= attempt.patience or self.steps_left == 0:
                 break
+            self.steps_left -= 1
             self.integrate(self.solve([self.task], 1.0), 1.0)
-        return error, k
+        attempt.q, attempt.patience = self.configuration.q.copy(), MORE_PATIENT * attempt.patience
 
 
 def further_starts(robot: BenchRobot, phases: int) -> FloatArray:

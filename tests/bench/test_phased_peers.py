@@ -93,6 +93,32 @@ def test_phases_reach_what_one_does_not_within_the_same_iterations():
     assert reached[phased] >= reached[plain] + 5
 
 
+@needs_robots
+@pytest.mark.parametrize("failures", [1, 8])
+def test_an_exception_ends_its_phase_only(failures):
+    """The start is the first phase: with it, or all eight, the library fails at once."""
+    robot = evaluator_of("panda").robot
+    configuration, frame = Configuration(robot), FrameTask(robot.effectors[0])
+    steps = []
+
+    def failing(*arguments, **more):
+        steps.append(arguments)
+        if len(steps) <= failures:
+            raise ArithmeticError(f"step {len(steps)}")
+        return solve_ik(*arguments, **more)
+
+    goal, starts = (robot, TOLERANCE, 100), further_starts(robot, 8)
+    reach = PhasedReach(failing, configuration, frame, goal, starts)
+    configuration.update(starts[0] + 0.1)  # near the start of the second phase
+    target = configuration.pose(frame.frame).copy()
+    if failures == 8:
+        with pytest.raises(ArithmeticError, match="step 1"):
+            reach([target], robot.lower)
+    else:
+        assert reach([target], robot.lower)
+        assert len(steps) < 10
+
+
 def test_phases_are_refused_for_a_robot_of_several_effectors():
     robot = evaluator_of(CHARACTER).robot
     with pytest.raises(UnableError):
