@@ -22,6 +22,7 @@ from ..articulation import Articulation, clamp_joint, normalise_start
 from ..backend.compiled import PythonKernel
 from .bounded_step import TaskSystem, damped_step, new_system, take_step
 from .chain import POSITION_ROUNDING
+from .far_step import fill_normal_equations, step_within_limits
 from .levenberg_marquardt import DAMPING_OF_TASKS
 from .linear_algebra import clear, inner
 from .mechanism import (
@@ -283,7 +284,11 @@ def step(state, damping):
         for k in range(len(system.J)):
             system.J[k, i] = state.scale[i] * current.J[k, i]
     square, left = inner(system.e, system.e), 0.0
-    damped_step(state.mechanism, state.data, system, damping)
+    if len(system.e) > len(system.step):  # the smaller system, of the same step
+        fill_normal_equations(system)
+        step_within_limits(state.mechanism, state.data, system, damping)
+    else:
+        damped_step(state.mechanism, state.data, system, damping)
     for i in range(len(system.e)):
         e = -scaled(state, current, i)
         for k in range(len(system.J)):

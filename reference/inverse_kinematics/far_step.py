@@ -69,9 +69,8 @@ def newton_step(state, target):
         factor, decay = factor * GROWTH, decay**FATIGUE
     else:
         factor = max(factor / decay, SMALLEST_DAMPING)
-    fill_hessian(mechanism, target, data, system)
-    for k in range(len(system.step)):
-        system.gradient[k] = inner(system.J[k], system.e)
+    fill_normal_equations(system)
+    add_curvature(mechanism, target, data, system)
     unit = mechanism.reach * math.sqrt(square)
     is_positive, tries = False, 0
     while not is_positive and tries < LARGEST_TRIES:
@@ -83,12 +82,17 @@ def newton_step(state, target):
     last["factor"], last["square"], last["decay"] = factor, square, decay
 
 
-def fill_hessian(mechanism, target, data, system):
-    """Fill the Hessian of |e|²/2, (freedom, freedom)."""
-    joints, H, reach = mechanism.joints, system.H, mechanism.reach
-    for k in range(len(H)):
+def fill_normal_equations(system):
+    """Fill J'J, (freedom, freedom), the Hessian of |e|²/2 where e is linear, and J'e."""
+    for k in range(len(system.H)):
+        system.gradient[k] = inner(system.J[k], system.e)
         for i in range(k + 1):
-            H[k, i] = H[i, k] = inner(system.J[k], system.J[i])
+            system.H[k, i] = system.H[i, k] = inner(system.J[k], system.J[i])
+
+
+def add_curvature(mechanism, target, data, system):
+    """Add the second derivatives of e times e to the Hessian of |e|²/2."""
+    joints, H, reach = mechanism.joints, system.H, mechanism.reach
     for e in range(len(mechanism.effectors)):
         x, j = effector_position(mechanism, data, e), mechanism.effectors["joint"][e]
         force = scale(target["weight"][e], position_error(mechanism, target, data, e))
