@@ -16,6 +16,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..backend.compiled import Kernel
+
 LEAF = 4  # pieces of at most so many vertices are not split
 LEAST_SHARE = 0.2  # of a piece: what the smaller half must have
 LARGEST_SHARE = 0.3  # of a piece: what a good separator may have
@@ -39,8 +41,17 @@ class Search(NamedTuple):
     lowest: np.ndarray  # the least coordinate among a vertex and its neighbours
 
 
-def nested_dissection(graph, order):
-    """Reorder the vertices in `order` in place, for little fill in their elimination."""
+def nested_dissection(graph: Graph) -> np.ndarray:
+    """Return an order of the vertices with little fill; very many neighbours put a vertex last."""
+    n = len(graph.indptr) - 1
+    is_hub = np.diff(graph.indptr) > max(16.0, 10.0 * math.sqrt(n))
+    order = np.argsort(is_hub, kind="stable").astype(np.int32)
+    _dissect(graph, order, n - int(is_hub.sum()))
+    return order
+
+
+def dissect(graph, order, count):
+    """Reorder the first vertices of an order in place; the other vertices are in no piece."""
     n = len(order)
     inside = np.zeros(n, np.bool_)
     search = Search(
@@ -49,8 +60,10 @@ def nested_dissection(graph, order):
         np.empty(n, np.int32),
         np.empty(n, np.int32),
     )
+    for v in order[count:]:
+        leave(search, v)
     pieces = np.empty((n + 2, 3), np.int32)  # first, last + 1 in order; whether it has coordinates
-    waiting = push(pieces, 0, 0, postpone_hubs(graph, search, order), 0)
+    waiting = push(pieces, 0, 0, count, 0)
     region = 0
     while waiting > 0:
         waiting -= 1
@@ -60,9 +73,11 @@ def nested_dissection(graph, order):
             put_rim_last(graph, piece, inside)
             continue
         if not measured:
-            region = enter(search, piece, region + 1)
+            region += 1
+            search.region[piece] = region
             if breadth_first(graph, search, region, piece[0], 0, 0) < len(piece):
-                region = enter(search, piece, region + 2)
+                region += 2
+                search.region[piece] = region
                 waiting = push_components(graph, search, region, piece, first, pieces, waiting)
                 region += 1
                 continue
@@ -85,34 +100,11 @@ def push(pieces, waiting, first, last, measured):
     return waiting + 1
 
 
-def postpone_hubs(graph, search, order):
-    """Put vertices with very many neighbours last; return the number of the others."""
-    n = len(order)
-    degree_limit = max(16.0, 10.0 * math.sqrt(n))
-    count, hubs = 0, n
-    for v in order.copy():
-        if graph.indptr[v + 1] - graph.indptr[v] > degree_limit:
-            hubs -= 1
-            order[hubs] = v
-            leave(search, v)
-        else:
-            order[count] = v
-            count += 1
-    return count
-
-
 def leave(search, v):
     """Remove a vertex from every piece."""
     search.region[v] = -1
     for axis in range(AXES):
         search.axes[axis, v] = REMOVED
-
-
-def enter(search, piece, region):
-    """Mark the vertices of a piece; return the mark."""
-    for v in piece:
-        search.region[v] = region
-    return region
 
 
 def breadth_first(graph, search, region, start, axis, head):
@@ -284,3 +276,6 @@ def put_rim_last(graph, piece, inside):
     for i, v in enumerate(piece.copy()):
         piece[places[outside[i]]] = v
         places[outside[i]] += 1
+
+
+_dissect = Kernel(dissect, label="the analysis of sparse matrices")

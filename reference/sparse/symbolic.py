@@ -57,8 +57,7 @@ def analyse(graph: Graph) -> SymbolicFactor:
     pattern = scipy.sparse.csc_array((np.ones(len(indices), np.int8), indices, indptr), (n, n))
     if (pattern != pattern.T).nnz:
         raise ValueError("matrix: expected both triangles with the same pattern")
-    order = np.arange(n, dtype=np.int32)
-    _dissect(graph, order)
+    order = nested_dissection(graph)
     parents, counts = _elimination_tree(graph, order, inverse(order))
     order, parents, counts = relabelled(_postorder(parents), order, parents, counts)
     columns = fundamental(parents, counts)
@@ -220,7 +219,6 @@ def row_lists(graph, order, place, member, above, starts):
     return rows
 
 
-_dissect = Kernel(nested_dissection, label="the analysis of sparse matrices")
 _elimination_tree = Kernel(elimination_tree)
 _postorder = Kernel(postorder)
 _amalgamate = Kernel(amalgamate)
