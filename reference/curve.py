@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from . import arguments
 from .arguments import FloatArray
 from .backend.compiled import Kernel
+from .quaternion import load_vector, norm, subtract
 
 # A finer curve would not fit into memory.
 MAX_POINTS = 10_000_000
@@ -137,10 +138,7 @@ def select_spaced(points, min_spacing, selection):
 
 def spacing(points, i, j):
     """Return the distance between points i and j."""
-    x = points[i, 0] - points[j, 0]
-    y = points[i, 1] - points[j, 1]
-    z = points[i, 2] - points[j, 2]
-    return np.sqrt(x * x + y * y + z * z)
+    return norm(subtract(load_vector(points, i), load_vector(points, j)))
 
 
 _select = Kernel(select_spaced)
