@@ -17,21 +17,18 @@ HALVINGS = 40
 
 
 def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
-    """Return an acceptable iterate along a descent step, or the start if there is none."""
-    slope = float(np.sum(start.gradient * step))
-    length = 1.0
+    """Return an acceptable iterate along a descent step, or the start if there is none.
+
+    It is acceptable if g decreased enough or, within rounding, if the slope at the end is small.
+    """
+    slope, length = float(np.sum(start.gradient * step)), 1.0
     for _ in range(HALVINGS):
         end = objective.iterate_at(start.positions + length * step)
-        if accepts(start, end, step, slope, length):
+        rise = end.value - start.value
+        if rise <= ARMIJO * length * slope or (
+            rise <= end.value_floor
+            and float(np.sum(end.gradient * step)) <= (2 * ARMIJO - 1) * slope
+        ):
             return end
         length /= 2
     return start
-
-
-def accepts(start: Iterate, end: Iterate, step: FloatArray, slope: float, length: float) -> bool:
-    """Return whether g decreased enough or, within rounding, the slope at the end is small."""
-    rise = end.value - start.value
-    if rise <= ARMIJO * length * slope:
-        return True
-    end_slope = float(np.sum(end.gradient * step))
-    return rise <= end.value_floor and end_slope <= (2 * ARMIJO - 1) * slope
