@@ -250,30 +250,22 @@ def _settings(root: Element) -> _CompilerSettings:
     merged = Element("compiler", {}, [], root.location)
     for compiler in root.children_named("compiler"):
         merged = compiler._replace(attributes=merged.attributes | compiler.attributes)
-    _one_of(merged, "coordinate", ("local",), "local")
+    merged.choice("coordinate", ("local",), "local")
     sequence = merged.word("eulerseq", "xyz")
     if len(sequence) != 3 or not set(sequence.lower()) <= set(AXES):
         raise merged.error(f"expected three axes such as xyz for eulerseq, got {sequence!r:.80}")
-    unit = _one_of(merged, "angle", ("degree", "radian"), "degree")
+    unit = merged.choice("angle", ("degree", "radian"), "degree")
     return _CompilerSettings(
         math.radians(1.0) if unit == "degree" else 1.0,
         sequence,
-        _one_of(merged, "autolimits", ("true", "false"), "true") == "true",
-        _one_of(merged, "alignfree", ("true", "false"), "false") == "true",
+        merged.choice("autolimits", ("true", "false"), "true") == "true",
+        merged.choice("alignfree", ("true", "false"), "false") == "true",
         merged.attributes.get("inertiafromgeom") == "true",
         merged.numbers("inertiagrouprange", (0.0, 5.0)),
         *merged.numbers("boundmass", (0.0,)),
         *merged.numbers("settotalmass", (-1.0,)),
         _classes(root),
     )
-
-
-def _one_of(element: Element, name: str, valid: Sequence[str], default: str) -> str:
-    """Return an attribute from a list of valid words."""
-    value = element.word(name, default)
-    if value not in valid:
-        raise element.error(f"expected one of {', '.join(valid)} for {name}, got {value!r:.80}")
-    return value
 
 
 def _direction(element: Element, name: str, vector: Vector) -> Vector:
@@ -528,10 +520,10 @@ class _Tree:
         kind = "free"
         if element.tag == "joint":
             element = self.settings.with_defaults(element, inherited)
-            kind = _one_of(element, "type", KINDS, "hinge")
+            kind = element.choice("type", KINDS, "hinge")
         label = part.element.word("name", f"{kind}{index + 1}")
         if kind == "free":
-            align = _one_of(element, "align", ("true", "false", "auto"), "auto")
+            align = element.choice("align", ("true", "false", "auto"), "auto")
             if align == "true" or (align == "auto" and self.settings.alignfree):
                 raise element.error(
                     "expected a free joint that is not aligned with the body's inertia"
@@ -548,7 +540,7 @@ class _Tree:
 
     def limits(self, joint: Element, kind: str) -> tuple[float, float]:
         """Return a joint's range, in the unit of the file."""
-        limited = _one_of(joint, "limited", ("true", "false", "auto"), "auto")
+        limited = joint.choice("limited", ("true", "false", "auto"), "auto")
         lower, upper = joint.numbers("range", (0.0, 0.0))
         if limited == "auto" and (lower or upper) and not self.settings.autolimits:
             raise joint.error("expected limited='true' or 'false' where autolimits is 'false'")

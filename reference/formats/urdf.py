@@ -74,17 +74,16 @@ def read(path: str | Path, *, mimic: bool = True, crossed_limits: str = "unlimit
         ValueError: naming file, line and element, if the file cannot be read or is not a URDF file
             with a single tree of links; naming the argument, if `crossed_limits` is unknown.
     """
-    arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     return _robot(xml.read(path), str(path), mimic, crossed_limits)
 
 
 def parse(text: str, *, mimic: bool = True, crossed_limits: str = "unlimited") -> Robot:
     """Return the robot described by a text; see `read`."""
-    arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     return _robot(xml.parse(text, "URDF"), "URDF", mimic, crossed_limits)
 
 
 def _robot(root: Element, origin: str, mimic: bool, crossed_limits: str) -> Robot:
+    arguments.choice("crossed_limits", crossed_limits, CROSSED_LIMITS)
     if root.tag != "robot":
         raise root.error("expected a <robot>")
     for element in root.walk():
@@ -157,9 +156,7 @@ def _with_mass(link: RobotLink, element: Element) -> RobotLink:
 
 
 def _joint(root: Element, element: Element) -> _Joint:
-    kind = element.word("type")
-    if kind not in KINDS:
-        raise element.error(f"expected one of {', '.join(KINDS)} for a type, got {kind!r:.80}")
+    kind = element.choice("type", KINDS)
     parent, child = _link_of(element, "parent"), _link_of(element, "child")
     frame = _orientation(root, element.single("origin"))
     return _Joint(element.word("name"), kind, parent, child, element, frame)
@@ -170,11 +167,7 @@ def _orientation(root: Element, origin: Element | None) -> Quaternion:
     if origin is None:
         return IDENTITY
     if "quat_xyzw" in origin.attributes:
-        version = root.word("version", "1.0")
-        if version not in VERSIONS:
-            expected = "one of " + ", ".join(VERSIONS)
-            raise root.error(f"expected {expected} for the version of a file, got {version!r:.40}")
-        if version != VERSIONS[0]:
+        if root.choice("version", VERSIONS, "1.0") != VERSIONS[0]:
             if "rpy" in origin.attributes:
                 raise origin.error("expected one orientation, got rpy and quat_xyzw")
             x, y, z, w = origin.numbers("quat_xyzw", (0.0, 0.0, 0.0, 0.0))

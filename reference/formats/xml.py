@@ -6,7 +6,7 @@ A document type declaration is refused: its entities may expand without bound or
 
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar, cast
 from xml.parsers import expat
@@ -59,6 +59,13 @@ class Element(NamedTuple):
         if not value:
             got = "none" if value is None else "an empty one"
             raise self.error(f"expected an attribute {name!r}, got {got}")
+        return value
+
+    def choice(self, name: str, valid: Collection[str], default: str | None = None) -> str:
+        """Return an attribute from a list of valid words."""
+        value = self.word(name, default)
+        if value not in valid:
+            raise self.error(f"expected one of {', '.join(valid)} for {name}, got {value!r:.80}")
         return value
 
     def numbers(self, name: str, default: Numbers) -> Numbers:

@@ -277,7 +277,7 @@ NO_QUATERNIONS = {
     "zero": ("1.1", 'quat_xyzw="0 0 0 0"', "expected a quaternion in 'quat_xyzw', got '0 0 0 0'"),
     "empty": ("1.2", 'quat_xyzw=""', "expected a quaternion in 'quat_xyzw', got ''"),
     "two": ("1.1", f'{QUATERNION} rpy="0 0 0"', "expected one orientation, got rpy and quat_xyzw"),
-    "a version to come": ("2.0", QUATERNION, "expected one of 1.0, 1.1, 1.2 for the version"),
+    "a version to come": ("2.0", QUATERNION, "expected one of 1.0, 1.1, 1.2 for version"),
 }
 
 
