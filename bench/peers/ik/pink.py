@@ -16,14 +16,7 @@ from ...problems.evaluate import evaluator_of, from_pinocchio, pinocchio_model, 
 from ...problems.robot_tasks import POSTURE_COST, RobotTask, TaskPart, TaskRequest, first_link
 from ..differential import PhasedReach, further_starts, meeting, reaching
 from ..peer import ONE_START, PORTFOLIO, Peer, Run, restarted, short_attempts
-from ..protocol import (
-    BenchRobot,
-    PoseRequest,
-    Solve,
-    SolveFactory,
-    Tolerance,
-    UnableError,
-)
+from ..protocol import BenchRobot, PoseRequest, Solve, SolveFactory, Tolerance, UnableError
 
 # The search chose these on the tuning robots (docs/peers/pink.md).
 _SETTINGS = {"damping": 1e-6, "lm_damping": 0.0, "gain": 1.0, "limit_gain": 0.5}
