@@ -113,7 +113,9 @@ def new_state(
 def solve(attempting, descending, state, tolerance, limit):
     """Meet the exact tasks from the data, then approach the others; the solution is `state.best`.
 
-    If not all exact tasks are met, a descent brings the best attempt to a minimum.
+    If not all exact tasks are met, a descent brings the best attempt to a minimum. Else descents
+    with all tasks begin at the best attempt; where one leads away from the exact tasks, these are
+    met again from there.
 
     Returns:
         The iterations, the value of the outcome, the largest error of an exact task, and the cost.
@@ -132,15 +134,21 @@ def solve(attempting, descending, state, tolerance, limit):
         copy_row(attempts.rows[BEST], state.row)
         attempting.place(state)
     descending.evaluate(state, current)
-    if largest_error(state, current, True) > tolerance:
-        more, settled = descend(descending, state, True, 1.0, tolerance, limit)
-        count += more
-        descending.keep(current, best)
-    else:
-        descending.keep(current, best)
-        if not exact.all():
-            more, settled = approach(descending, state, tolerance, limit)
-            count += more
+    descending.keep(current, best)
+    met, made = largest_error(state, best, True) <= tolerance, 0
+    for stage in range(0 if met and exact.all() else 2 * len(STRENGTHS)):
+        repairs = stage % 2 == 1
+        if not repairs or largest_error(state, current, True) > tolerance:
+            alone = repairs or not met
+            strength = 1.0 if alone else STRENGTHS[stage // 2]
+            more, settled = descend(descending, state, alone, strength, tolerance, limit - made)
+            made += more
+        if not met or (repairs and is_better(state, tolerance)):
+            descending.keep(current, best)
+            break
+        if repairs:
+            descending.keep(best, current)
+    count += made
     error, others = largest_error(state, best, True), largest_error(state, best, False)
     cost = square_of(state, best, False)
     share = MINIMUM_BETWEEN if settled and exact.any() else MINIMUM
@@ -201,27 +209,10 @@ def draw_tasks(state, _target, _criteria, n):
     copy_row(state.restarts[n - 1], state.row)
 
 
-def approach(operations, state, tolerance, limit):
-    """Lower the cost of the other tasks from `state.best`, which meets the exact tasks.
-
-    If this ends away from the exact tasks, they are met again from there.
-
-    Returns:
-        The iterations, and whether the last descent has settled.
-    """
-    current, best, count, settled = state.current, state.best, 0, False
-    for strength in STRENGTHS:
-        operations.keep(best, current)
-        more, settled = descend(operations, state, False, strength, tolerance, limit - count)
-        count += more
-        if largest_error(state, current, True) > tolerance:
-            more, settled = descend(operations, state, True, 1.0, tolerance, limit - count)
-            count += more
-        met = largest_error(state, current, True) <= tolerance
-        if met and square_of(state, current, False) < square_of(state, best, False):
-            operations.keep(current, best)
-            break
-    return count, settled
+def is_better(state, tolerance):
+    """Return whether the current configuration meets the exact tasks at less cost than the best."""
+    costs = square_of(state, state.current, False), square_of(state, state.best, False)
+    return largest_error(state, state.current, True) <= tolerance and costs[0] < costs[1]
 
 
 def descend(operations, state, alone, strength, tolerance, limit):

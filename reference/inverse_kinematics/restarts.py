@@ -24,15 +24,15 @@ from ..backend.compiled import PythonKernel
 PATIENCE, PATIENCE_OF_PHASES = 3, 8
 PROGRESS, MORE_PATIENT = 0.5, 4
 # How an attempt ended: within the tolerances, or of the nearest point that geometry allows; without
-# further progress; with its iterations used; given up early.
-REACHED, STALLED, LIMITED, GIVEN_UP = range(4)
+# further progress; with its iterations used; given up early. An attempt to come is UNMADE.
+REACHED, STALLED, LIMITED, GIVEN_UP, UNMADE = range(5)
 INFINITY = math.inf
 # An attempt at a target, for kernels.
 ATTEMPT = np.dtype(
     [
         ("iterations", np.int64),  # made so far
         ("ending", np.int64),
-        ("merit", np.float64),  # of its end [m], infinite before the attempt begins
+        ("merit", np.float64),  # of its end [m]
         ("patience", np.float64),  # iterations without progress after which it is given up
         ("milestone", np.float64),  # the error [m] whose share PROGRESS is the next progress
         ("since", np.int64),  # iterations since the last progress
@@ -124,8 +124,6 @@ def solve_with_restarts(operations, state, search, target, criteria, history):
         The iterations of all attempts, and whether the best of them has ended by itself.
     """
     begin_search(operations, state, search, target, criteria)
-    distance, _, _, _ = operations.error(state, target)
-    store_if_inside(history, 0, distance)
     k, extensions = 0, 0
     while True:
         allowed = iterations_left(search, criteria, k, extensions)
@@ -136,10 +134,10 @@ def solve_with_restarts(operations, state, search, target, criteria, history):
             continue
         k = next_attempt(operations, state, search, target, criteria, extensions)
         if k < 0:
-            extensions += 1
-            if not extend_first(operations, state, search, criteria, extensions):
+            k, extensions = 0, extensions + 1
+            if not extend_first(state, search, criteria, extensions):
                 break
-            k = 0
+        operations.place(state)
     best = search.attempts[BEST]
     return best["iterations"], best["ending"] <= STALLED
 
@@ -158,11 +156,12 @@ def begin_search(operations, state, search, target, criteria):
     """Begin with the start; no attempt at a target out of reach is given up."""
     for k in range(len(search.attempts)):
         attempt = search.attempts[k]
-        attempt["iterations"], attempt["ending"], attempt["merit"] = 0, LIMITED, INFINITY
+        attempt["iterations"], attempt["ending"], attempt["merit"] = 0, UNMADE, INFINITY
         patience = PATIENCE if k < first_phase(criteria) else PATIENCE_OF_PHASES
         attempt["patience"] = patience if criteria.gives_up else INFINITY
         attempt["milestone"], attempt["since"] = INFINITY, 0
-    save(state, search, START)
+    copy_row(state.row, search.rows[START])
+    copy_row(state.row, search.rows[BEST])  # stays where all numbers overflow
     perturb(operations, state, search, target, criteria)
 
 
@@ -174,31 +173,29 @@ def perturb(operations, state, search, target, criteria):
     if not operations.perturb(state, target, criteria, first):
         return False
     start["ending"] = STALLED
-    save(state, search, START)
+    copy_row(state.row, search.rows[START])
     return True
 
 
 def next_attempt(operations, state, search, target, criteria, extensions):
-    """Begin the next attempt, or go on with the most promising; return its index, -1 if none."""
+    """Write the row of the next attempt, or of the most promising; return its index, -1 if none."""
     phases = first_phase(criteria)
     for k in range(1, attempt_count(criteria)):
-        if search.attempts[k]["merit"] == INFINITY:
+        if search.attempts[k]["ending"] == UNMADE:
             if k < phases:
                 operations.draw(state, target, criteria, k)
-                operations.place(state)
                 return k
             if iterations_left(search, criteria, k, extensions) > 0:
-                resume(operations, state, search, START)
+                copy_row(search.rows[START], state.row)
                 if k > phases:
                     operations.shift(state, k - phases)
-                    operations.place(state)
                 return k
     k = most_promising(search, criteria, extensions)
     if k >= 0:
         attempt = search.attempts[k]
         attempt["patience"] *= MORE_PATIENT
         attempt["milestone"], attempt["since"] = INFINITY, 0
-        resume(operations, state, search, k)
+        copy_row(search.rows[k], state.row)
     return k
 
 
@@ -220,11 +217,11 @@ def most_promising(search, criteria, extensions):
     return best
 
 
-def extend_first(operations, state, search, criteria, extensions):
-    """Go on with the first attempt for as many iterations again; return whether this is allowed."""
+def extend_first(state, search, criteria, extensions):
+    """Give the first attempt as many iterations again; return whether this is allowed."""
     first = search.attempts[0]
     first["patience"] = INFINITY
-    resume(operations, state, search, 0)
+    copy_row(search.rows[0], state.row)
     return extensions <= criteria.extensions and first["ending"] in (LIMITED, GIVEN_UP)
 
 
@@ -238,17 +235,6 @@ def iterations_left(search, criteria, k, extensions):
     return most - made
 
 
-def save(state, search, k):
-    """Save where an attempt ended."""
-    copy_row(state.row, search.rows[k])
-
-
-def resume(operations, state, search, k):
-    """Bring the state to where an attempt ended."""
-    copy_row(search.rows[k], state.row)
-    operations.place(state)
-
-
 def go_on(operations, state, search, k, target, criteria, allowed, history):
     """Continue attempt k; save its end, and again if it is the best."""
     attempt, best = search.attempts[k], search.attempts[BEST]
@@ -256,11 +242,11 @@ def go_on(operations, state, search, k, target, criteria, allowed, history):
         operations, state, target, criteria, attempt, allowed, history, best["iterations"]
     )
     attempt["merit"] = operations.merit(state, target)
-    save(state, search, k)
+    copy_row(state.row, search.rows[k])
     is_settled = attempt["merit"] == best["merit"] and best["ending"] == GIVEN_UP
     if attempt["ending"] == REACHED or attempt["merit"] < best["merit"] or is_settled:
         best["ending"], best["merit"] = attempt["ending"], attempt["merit"]
-        save(state, search, BEST)
+        copy_row(state.row, search.rows[BEST])
 
 
 def solve_once(operations, state, target, criteria, attempt, allowed, history, earlier):
@@ -271,28 +257,26 @@ def solve_once(operations, state, target, criteria, attempt, allowed, history, e
     Returns:
         The iterations made.
     """
-    _, angle, total, bound = operations.error(state, target)
-    milestone, since = min(attempt["milestone"], total), attempt["since"]
-    count, ending = 0, LIMITED
-    while ending == LIMITED:
+    milestone, since = attempt["milestone"], attempt["since"]
+    count, ending, before = 0, LIMITED, INFINITY
+    while True:
+        distance, angle, total, bound = operations.error(state, target)
+        if count > 0 or earlier == 0:
+            store_if_inside(history, earlier + count, distance)
+        if total < PROGRESS * milestone:
+            milestone, since = total, 0
         if bound <= criteria.distance and angle <= criteria.angle:
             ending = REACHED
-        if ending == REACHED or count >= allowed:
+        elif count > 0 and abs(before - total) <= criteria.margin:
+            ending = STALLED
+        elif since >= attempt["patience"]:
+            ending = GIVEN_UP
+        if ending != LIMITED or count >= allowed:
             break
         before = total
         operations.update(state, target)
         count += 1
-        distance, angle, total, bound = operations.error(state, target)
-        store_if_inside(history, earlier + count, distance)
         since += 1
-        if total < PROGRESS * milestone:
-            milestone, since = total, 0
-        if abs(before - total) <= criteria.margin:
-            ending = STALLED
-        elif since >= attempt["patience"]:
-            ending = GIVEN_UP
-    if ending != LIMITED and bound <= criteria.distance and angle <= criteria.angle:
-        ending = REACHED
     attempt["iterations"] += count
     attempt["ending"], attempt["milestone"], attempt["since"] = ending, milestone, since
     return count

@@ -97,7 +97,7 @@ def solve(
         method.sweep(chain, target, i, choices, pose)
         i += 1
     if i > 0:
-        method.finish(chain, pose)
+        method.finish(chain, pose, pose.positions.copy())
     return i
 
 
@@ -146,7 +146,7 @@ def apply_rotation(chain: TextbookChain, j: int, d: Any, pose: TextbookPose) -> 
     store_quaternion(pose.local, j, normalised(Q) if 0.0 < length < math.inf else Q)
 
 
-def leave(chain: TextbookChain, pose: TextbookPose) -> None:
+def leave(chain: TextbookChain, pose: TextbookPose, points: FloatArray) -> None:
     """Leave a pose of CCD as it is."""
 
 
@@ -178,9 +178,8 @@ def link_length(chain: TextbookChain, k: int) -> float:
     return norm(load_vector(chain.offsets, chain.path[k + 1]))
 
 
-def follow(chain: TextbookChain, pose: TextbookPose) -> None:
+def follow(chain: TextbookChain, pose: TextbookPose, points: FloatArray) -> None:
     """Rotate each joint of the path to its link's new direction; the path keeps its positions."""
-    points = pose.positions.copy()
     for k in range(len(chain.path) - 1):
         place(chain, pose)
         j, child = chain.path[k], chain.path[k + 1]
