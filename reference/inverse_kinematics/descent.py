@@ -118,7 +118,8 @@ def solve(attempting, descending, state, tolerance, limit):
     met again from there.
 
     Returns:
-        The iterations, the value of the outcome, the largest error of an exact task, and the cost.
+        The iterations, the value of the outcome, the largest error of a task, infinite where
+        numbers overflow, and the cost.
     """
     current, best, exact = state.current, state.best, state.tasks.exact
     count, settled = 0, False
@@ -155,7 +156,7 @@ def solve(attempting, descending, state, tolerance, limit):
     converged = error <= tolerance and (
         others <= tolerance or remaining(descending, state) <= share * cost
     )
-    return count, outcome_of(converged, False, settled).value, error, cost
+    return count, outcome_of(converged, False, settled).value, max(error, others), cost
 
 
 def criteria_of(state, tolerance, limit):

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import arguments
-from ..arguments import FloatArray, frozen, shown
+from ..arguments import LARGEST_COORDINATE, FloatArray, frozen, shown
 from ..articulation import Articulation
 from ..backend.compiled import Kernel
 from ..model import Model, checked_model, effector_of
@@ -126,9 +126,12 @@ class PreparedTasks(threading.local):
         """
         row, best = arguments.floats("q", q, len(self._q)), self._state.best
         model, _, (tolerance, limit, *_) = self._problem
-        count, outcome, _, cost = self._solve(row, tolerance, limit)
+        count, outcome, error, cost = self._solve(row, tolerance, limit)
         if count < 0:  # raise, or the lengths were within rounding of the tolerance
-            count, outcome, _, cost = self._solve(model.checked("q", row), tolerance, limit)
+            count, outcome, error, cost = self._solve(model.checked("q", row), tolerance, limit)
+        if not error <= LARGEST_COORDINATE:
+            bound = f"at most {LARGEST_COORDINATE:g}"
+            raise ValueError(f"residual: expected numbers of {bound}, got {error:g}")
         self._q[:], self._errors[:] = best.q, best.errors
         self.cost, self.iterations = cost, count
         return OUTCOMES[outcome]

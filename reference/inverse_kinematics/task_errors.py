@@ -149,7 +149,7 @@ def weigh(tasks, t, evaluation):
     root, largest = math.sqrt(tasks.records["weight"][t]), 0.0
     for i in range(row, row + size):
         r[i] *= tasks.factors[i]
-        largest = max(largest, abs(r[i]))
+        largest = max(largest, abs(r[i])) if r[i] == r[i] else math.inf
         r[i] *= root
         for k in range(len(evaluation.J)):
             evaluation.J[k, i] *= tasks.factors[i] * root

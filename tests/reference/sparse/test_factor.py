@@ -43,7 +43,7 @@ def test_another_matrix_is_refactorised_whatever_its_pattern(matrix, rng):
     factor = CholeskyFactor(matrix)
     x = rng.standard_normal((30, 3))
     for other in (2 * matrix, matrix @ matrix):
-        solved = factor.reCholeskyFactor(other.tocsc()).solve(other @ x)
+        solved = factor.refactorize(other.tocsc()).solve(other @ x)
         # Squaring squares the condition number, which stays below 10,000.
         np.testing.assert_allclose(solved, x, rtol=0, atol=1e-11)
 
