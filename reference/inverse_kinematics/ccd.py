@@ -238,15 +238,15 @@ def translate_effectors(mechanism, data, j, v):
             store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
-ON_CHAINS = Kernel(solve_chains, given=(on_chains(ccd_sweep), 0), label="ccd, chains")
+ON_CHAINS = Kernel(solve_chains, constants=(on_chains(ccd_sweep), 0), label="ccd, chains")
 ON_MECHANISMS = Kernel(
-    solve_mechanisms, given=(on_mechanisms(ccd_update), 0), label="ccd, mechanisms"
+    solve_mechanisms, constants=(on_mechanisms(ccd_update), 0), label="ccd, mechanisms"
 )
 ANDERSON_ON_CHAINS = Kernel(
-    solve_chains, given=(on_chains(anderson_ccd_sweep), DEPTH), label="anderson_ccd, chains"
+    solve_chains, constants=(on_chains(anderson_ccd_sweep), DEPTH), label="anderson_ccd, chains"
 )
 ANDERSON_ON_MECHANISMS = Kernel(
     solve_mechanisms,
-    given=(on_mechanisms(anderson_ccd_update), DEPTH),
+    constants=(on_mechanisms(anderson_ccd_update), DEPTH),
     label="anderson_ccd, mechanisms",
 )

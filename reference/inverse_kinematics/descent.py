@@ -122,41 +122,41 @@ def solve(attempting, descending, state, tolerance, limit):
         numbers overflow, and the cost.
     """
     current, best, exact = state.current, state.best, state.tasks.exact
-    count, settled = 0, False
+    count, is_settled = 0, False
     if exact.any():
         criteria = criteria_of(state, tolerance, limit)
-        attempts, history = (
-            new_search(len(state.restarts) + 1 + criteria.phases, len(state.row)),
-            np.empty(1),
-        )
-        count, settled = solve_with_restarts(
+        attempts = new_search(len(state.restarts) + 1 + criteria.phases, len(state.row))
+        history = np.empty(1)
+        count, is_settled = solve_with_restarts(
             attempting, state, attempts, state.tasks.records, criteria, history
         )
         copy_row(attempts.rows[BEST], state.row)
         attempting.place(state)
     descending.evaluate(state, current)
     descending.keep(current, best)
-    met, made = largest_error(state, best, True) <= tolerance, 0
-    for stage in range(0 if met and exact.all() else 2 * len(STRENGTHS)):
+    is_met, iterations = largest_error(state, best, True) <= tolerance, 0
+    for stage in range(0 if is_met and exact.all() else 2 * len(STRENGTHS)):
         repairs = stage % 2 == 1
         if not repairs or largest_error(state, current, True) > tolerance:
-            alone = repairs or not met
+            alone = repairs or not is_met
             strength = 1.0 if alone else STRENGTHS[stage // 2]
-            more, settled = descend(descending, state, alone, strength, tolerance, limit - made)
-            made += more
-        if not met or (repairs and is_better(state, tolerance)):
+            more, is_settled = descend(
+                descending, state, alone, strength, tolerance, limit - iterations
+            )
+            iterations += more
+        if not is_met or (repairs and is_better(state, tolerance)):
             descending.keep(current, best)
             break
         if repairs:
             descending.keep(best, current)
-    count += made
-    error, others = largest_error(state, best, True), largest_error(state, best, False)
+    count += iterations
+    error, other_error = largest_error(state, best, True), largest_error(state, best, False)
     cost = square_of(state, best, False)
-    share = MINIMUM_BETWEEN if settled and exact.any() else MINIMUM
+    share = MINIMUM_BETWEEN if is_settled and exact.any() else MINIMUM
     converged = error <= tolerance and (
-        others <= tolerance or remaining(descending, state) <= share * cost
+        other_error <= tolerance or remaining(descending, state) <= share * cost
     )
-    return count, outcome_of(converged, False, settled).value, max(error, others), cost
+    return count, outcome_of(converged, False, is_settled).value, max(error, other_error), cost
 
 
 def criteria_of(state, tolerance, limit):
@@ -227,13 +227,13 @@ def descend(operations, state, alone, strength, tolerance, limit):
     """
     current, trial, any_exact = state.current, state.trial, state.tasks.exact.any()
     set_scale(state, strength, 0.0 if alone else 1.0)
-    settled = SETTLED if alone or not any_exact else SETTLED_BETWEEN
+    share = SETTLED if alone or not any_exact else SETTLED_BETWEEN
     unit = largest_diagonal(state, current, True)
     unit = max(unit, largest_diagonal(state, current, False)) or 1.0
     damping, growth, length, penalties = FIRST_DAMPING * unit, 2.0, math.inf, 0
     for count in range(limit):
-        met = largest_error(state, current, True) <= tolerance
-        if alone and met:
+        is_met = largest_error(state, current, True) <= tolerance
+        if alone and is_met:
             return count, True
         square, promised = operations.step(state, damping)
         operations.evaluate(state, trial)
@@ -241,21 +241,21 @@ def descend(operations, state, alone, strength, tolerance, limit):
         damping, growth = next_damping(damping, growth, ratio)
         if ratio > ACCEPTED:
             operations.keep(trial, current)
-        if promised > settled * square and damping < LARGEST_DAMPING * unit:
+        if promised > share * square and damping < LARGEST_DAMPING * unit:
             continue
-        met = largest_error(state, current, True) <= tolerance
-        if alone or met or penalties == PENALTIES:
+        is_met = largest_error(state, current, True) <= tolerance
+        if alone or is_met or penalties == PENALTIES:
             return count + 1, True
         before, length = length, math.sqrt(square_of(state, current, True))
         penalties += update_multipliers(state, length > PROGRESS * before)
     return limit, False
 
 
-def set_scale(state, strength, others):
+def set_scale(state, strength, other):
     """Set the factors of exact residuals and of the others, and no multipliers."""
     clear(state.multipliers)
     for i in range(len(state.scale)):
-        state.scale[i] = strength if state.tasks.exact[i] else others
+        state.scale[i] = strength if state.tasks.exact[i] else other
 
 
 def scaled(state, evaluation, i):

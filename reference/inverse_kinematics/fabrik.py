@@ -322,7 +322,7 @@ def pose_below(joints, data, j, k, x, R):
     return rotate(Q, x), multiply(Q, R)
 
 
-ON_CHAINS = Kernel(solve_chains, given=(on_chains(fabrik_sweep), 0), label="fabrik, chains")
+ON_CHAINS = Kernel(solve_chains, constants=(on_chains(fabrik_sweep), 0), label="fabrik, chains")
 ON_MECHANISMS = Kernel(
-    solve_mechanisms, given=(on_mechanisms(fabrik_update), 0), label="fabrik, mechanisms"
+    solve_mechanisms, constants=(on_mechanisms(fabrik_update), 0), label="fabrik, mechanisms"
 )

@@ -155,20 +155,22 @@ def rotate_joints(chain, z):
 
 
 TRANSPOSE_ON_CHAINS = Kernel(
-    solve_chains, given=(on_chains(jacobian_transpose_sweep), 0), label="jacobian_transpose, chains"
+    solve_chains,
+    constants=(on_chains(jacobian_transpose_sweep), 0),
+    label="jacobian_transpose, chains",
 )
 TRANSPOSE_ON_MECHANISMS = Kernel(
     solve_mechanisms,
-    given=(on_mechanisms(jacobian_transpose_update), 0),
+    constants=(on_mechanisms(jacobian_transpose_update), 0),
     label="jacobian_transpose, mechanisms",
 )
 DAMPED_ON_CHAINS = Kernel(
     solve_chains,
-    given=(on_chains(damped_least_squares_sweep), 0),
+    constants=(on_chains(damped_least_squares_sweep), 0),
     label="damped_least_squares, chains",
 )
 DAMPED_ON_MECHANISMS = Kernel(
     solve_mechanisms,
-    given=(on_mechanisms(damped_least_squares_update), 0),
+    constants=(on_mechanisms(damped_least_squares_update), 0),
     label="damped_least_squares, mechanisms",
 )

@@ -59,11 +59,11 @@ def levenberg_marquardt_update(state, target):
 
 ON_CHAINS = Kernel(
     solve_chains,
-    given=(on_chains(levenberg_marquardt_sweep), 0),
+    constants=(on_chains(levenberg_marquardt_sweep), 0),
     label="levenberg_marquardt, chains",
 )
 ON_MECHANISMS = Kernel(
     solve_mechanisms,
-    given=(on_mechanisms(levenberg_marquardt_update), 0),
+    constants=(on_mechanisms(levenberg_marquardt_update), 0),
     label="levenberg_marquardt, mechanisms",
 )

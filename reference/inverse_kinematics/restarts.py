@@ -227,12 +227,12 @@ def extend_first(state, search, criteria, extensions):
 
 def iterations_left(search, criteria, k, extensions):
     """Return how many iterations an attempt may make."""
-    most, phases, made = criteria.max_iterations, first_phase(criteria), 0
+    most, phases, count = criteria.max_iterations, first_phase(criteria), 0
     if k < phases:
         return (1 + extensions if k == 0 else 1) * most - search.attempts[k]["iterations"]
     for phase in range(phases, attempt_count(criteria)):
-        made += search.attempts[phase]["iterations"]
-    return most - made
+        count += search.attempts[phase]["iterations"]
+    return most - count
 
 
 def go_on(operations, state, search, k, target, criteria, allowed, history):

@@ -128,13 +128,13 @@ def run(
             )
     memory = np.empty(n * result_size(problem.joints, problem.coordinates, columns))
     kernel = settings.solver.chain if is_chain else settings.solver.mechanism
-    given = problem.memory, settings.numbers, starts, targets, memory
+    constants = problem.memory, settings.numbers, starts, targets, memory
     minimum = SLICE_ON_CHAINS if is_chain else SLICE_ON_MECHANISMS
     if n < 2 * minimum or limits.chained:
-        valid = kernel(*given, 0, n)
+        valid = kernel(*constants, 0, n)
     else:
         valid = all(
-            in_slices(kernel, n, lambda part: (*given, part.start, part.stop), minimum=minimum)
+            in_slices(kernel, n, lambda part: (*constants, part.start, part.stop), minimum=minimum)
         )
     return memory if valid else None
 

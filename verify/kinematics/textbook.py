@@ -192,6 +192,8 @@ def follow(chain: TextbookChain, pose: TextbookPose, points: FloatArray) -> None
 
 
 SOLVERS = {
-    "ccd": Kernel(solve, given=(Method(sweep_ccd, leave),), label="CCD of the textbook"),
-    "fabrik": Kernel(solve, given=(Method(sweep_fabrik, follow),), label="FABRIK of the textbook"),
+    "ccd": Kernel(solve, constants=(Method(sweep_ccd, leave),), label="CCD of the textbook"),
+    "fabrik": Kernel(
+        solve, constants=(Method(sweep_fabrik, follow),), label="FABRIK of the textbook"
+    ),
 }

@@ -61,9 +61,9 @@ def powered(power, factor, x):
 
 
 def test_a_kernel_is_given_its_first_arguments(backend):
-    cubes = compiled.Kernel(powered, given=(cube, 10.0))
+    cubes = compiled.Kernel(powered, constants=(cube, 10.0))
     assert cubes(2.0) == 10.0 * cube(2.0)
-    squares = compiled.Kernel(powered, given=(square, 10.0))
+    squares = compiled.Kernel(powered, constants=(square, 10.0))
     assert squares(2.0) == 10.0 * square(2.0)
     assert compiled.digest(cubes.plain) != compiled.digest(squares.plain)
 
