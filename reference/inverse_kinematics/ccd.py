@@ -14,7 +14,8 @@ down the gradient. The solver `anderson_ccd` combines the last sweeps (`anderson
   acceleration. Near the straight pose CCD is the method of Gauss and Seidel on a Hessian of
   r_i r_k + g r_ik: r_i is the arm of joint i, r_ik the shorter of two arms, and g the gap. The
   first term has rank one, so all directions but one rest on the gap.
-- *Compiled* are the kernels at the end, with all that they call, by numba from this source.
+- *Compiled* are the kernels at the end, with all that they call: numba compiles the same
+  functions that the interpreter can run.
 """
 
 import math

@@ -13,7 +13,8 @@ a rotation. A joint with followers goes down the gradient. The remaining distanc
 - *Limits*: `move_by` and `rotate_to` stop each joint at its own, also a joint with followers.
 - *Beyond reach*: `lay_on_line` straightens a chain in a single pass. A mechanism goes on as within
   reach.
-- *Compiled* are the two kernels at the end, with all that they call, by numba from this source.
+- *Compiled* are the two kernels at the end, with all that they call: numba compiles the same
+  functions that the interpreter can run.
 """
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_in_world, joint_transform

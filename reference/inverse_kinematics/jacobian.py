@@ -11,12 +11,13 @@ the same iterations on a chain of ten balls, but a solve takes nine times as lon
 - *Damping*: FIXED_DAMPING, the square of a tenth of the reach, of damped least squares alone.
 - *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
   changes, or the iterations allowed are made. Of a target out of reach the nearest point counts.
-- *Limits*: steps stop hinges and slides at their own and leave the rest to the other joints;
-  `take_step` clamps balls (`bounded_step.py`).
+- *Limits* (`bounded_step.py`): damped steps stop hinges and slides at their own and leave the rest
+  to the other joints; transposed steps leave out what is at a limit. `take_step` clamps all joints.
 - *Beyond reach*: a chain's target is drawn nearer (`drawn_near`). On mechanisms damped least
   squares makes Newton's steps with a damping of their own (`far_step.py`); the transposed Jacobian
   goes on as within reach.
-- *Compiled* are the kernels at the end, with all that they call, by numba from this source.
+- *Compiled* are the kernels at the end, with all that they call: numba compiles the same
+  functions that the interpreter can run.
 """
 
 from ..backend.compiled import Kernel

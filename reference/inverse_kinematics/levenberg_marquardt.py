@@ -6,8 +6,8 @@ An iteration computes the errors e of the effectors and their Jacobian J. It sol
 - *Damping*: mu is a share of |e|² plus a bias (Sugihara 2011). Far from the target the step is
   short and safe; near the target convergence is quadratic. ROUNDING_DAMPING keeps factors above
   rounding.
-- *Acceptance*: every step is taken. Only where the errors cannot vanish, as of a posture, a step
-  has to lower them (`descent.py`).
+- *Acceptance*: every step is taken; tasks that are approached only, such as a posture, have a
+  descent whose steps have to lower the errors (`descent.py`).
 - *End*: `restarts.py` repeats steps until the target is within the tolerances, the error no longer
   changes, or the iterations allowed are made. Of a target out of reach the nearest point counts. On
   mechanisms a start that stalls or hardly progresses is followed by further starts.
@@ -15,7 +15,8 @@ An iteration computes the errors e of the effectors and their Jacobian J. It sol
   `take_step` clamps balls (`bounded_step.py`).
 - *Beyond reach*: on mechanisms `step_towards` makes Newton's steps to the nearest pose, with a
   damping of their own (`far_step.py`). A chain's target is drawn to the nearest point in reach.
-- *Compiled* are the two kernels at the end, with all that they call, by numba from this source.
+- *Compiled* are the two kernels at the end, with all that they call: numba compiles the same
+  functions that the interpreter can run.
 
 `levenberg_marquardt_sweep` is the form for a chain of unlimited balls with one position, where
 J J' has closed entries (`jacobian.py`).

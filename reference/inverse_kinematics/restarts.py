@@ -1,8 +1,9 @@
 """The loops of every solver: iterations of an attempt, and attempts from several starts.
 
-The loops work on the state of a chain of unlimited balls (`solve_chain.py`) or of a mechanism
-(`solve_mechanism.py`), through its `Operations`. Both states have a `row` of coordinates, from
-which an attempt continues.
+The loops work on the state of a chain of unlimited balls (`solve_chain.py`), of a mechanism
+(`solve_mechanism.py`) or of tasks (`descent.py`), through its `Operations`. Each state has a `row`
+of numbers, from which an attempt continues. Damping, limits of joints and steps towards targets out
+of reach are those of the updates.
 
 Attempts are the plain attempt from the start, then random *restarts*. A solver with *phases* makes
 another round: from the start, and from further starts that are always the same. Without restarts
@@ -116,7 +117,7 @@ def solve_with_restarts(operations, state, search, target, criteria, history):
 
     An attempt at a target in reach is given up early if others may follow. While none reaches the
     target, the most promising attempt given up goes on. The phases have the iterations of an
-    attempt together, and are the same whatever the number of restarts. With a solver of a single
+    attempt together, and begin alike whatever the number of restarts. With a solver of a single
     phase the start goes on for as many iterations as all attempts may make. So the result is no
     worse than with fewer restarts.
 

@@ -73,7 +73,8 @@ STUCK = 6
 # Out of reach an error has stalled if it changes by no more than this share of the tolerance. Where
 # an iteration gains a ten-thousandth of what is left, a ten-thousandth of the tolerance remains.
 FAR_MARGIN = 1e-8
-# A stuck ball is bent about this axis of its own, which lies across no plane of the axes.
+# A stuck ball is bent about this axis of its own, and turned at further starts; no two components
+# are equal, so that balls in a row do not turn in a plane of their axes.
 PERTURBATION_AXIS = (0.48, 0.6, 0.64)
 
 
@@ -334,18 +335,22 @@ def shift_mechanism(state, n):
     """Change the row from the start to further start n, within the limits.
 
     Each hinge or slide with two limits goes to a share of its range, the same for every start. A
-    hinge without limits turns by this share of a circle; all other joints stay. The first further
-    start is the middle.
+    hinge without two limits, a ball and a free joint turn by this share of a circle; slides without
+    stay. The first further start is the middle.
     """
     joints, q = state.mechanism.joints, state.data.q
     for j in range(len(joints)):
-        if joints["leader"][j] == j and joints["kind"][j] in (HINGE, SLIDE):
-            at, lower, upper = joints["coordinate"][j], joints["lower"][j], joints["upper"][j]
-            share = state.shares[n - 1, j]
-            if math.isfinite(upper - lower):
-                q[at] = lower + share * (upper - lower)
-            elif joints["kind"][j] == HINGE:
-                q[at] = min(max(q[at] + share * FULL_CIRCLE, lower), upper)
+        kind = joints["kind"][j] if joints["leader"][j] == j else FIXED
+        at, lower, upper = joints["coordinate"][j], joints["lower"][j], joints["upper"][j]
+        share = state.shares[n - 1, j]
+        if kind in (HINGE, SLIDE) and math.isfinite(upper - lower):
+            q[at] = lower + share * (upper - lower)
+        elif kind == HINGE:
+            q[at] = min(max(q[at] + share * FULL_CIRCLE, lower), upper)
+        elif kind in (BALL, FREE):
+            turn = rotation_about(PERTURBATION_AXIS, share * FULL_CIRCLE)
+            store_ball(joints, q, j, normalised(multiply(load_ball(joints, q, j), turn)))
+            clamp_joint(joints, j, q)
 
 
 def on_mechanisms(update: Any) -> Operations:
