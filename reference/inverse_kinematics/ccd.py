@@ -21,7 +21,6 @@ down the gradient. The solver `anderson_ccd` combines the last sweeps (`anderson
 import math
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, clamp_joint
-from ..backend.compiled import Kernel
 from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
@@ -60,8 +59,7 @@ from .mechanism import (
     update_forward_kinematics,
 )
 from .restarts import copy_row
-from .solve_chain import on_chains, solve_chains
-from .solve_mechanism import on_mechanisms, solve_mechanisms
+from .solve_mechanism import kernels_of
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, alignment, best_angle, best_rotation
 
 
@@ -239,15 +237,7 @@ def translate_effectors(mechanism, data, j, v):
             store_effector(mechanism, data, e, moved, effector_rotation(mechanism, data, e))
 
 
-ON_CHAINS = Kernel(solve_chains, constants=(on_chains(ccd_sweep), 0), label="ccd, chains")
-ON_MECHANISMS = Kernel(
-    solve_mechanisms, constants=(on_mechanisms(ccd_update), 0), label="ccd, mechanisms"
-)
-ANDERSON_ON_CHAINS = Kernel(
-    solve_chains, constants=(on_chains(anderson_ccd_sweep), DEPTH), label="anderson_ccd, chains"
-)
-ANDERSON_ON_MECHANISMS = Kernel(
-    solve_mechanisms,
-    constants=(on_mechanisms(anderson_ccd_update), DEPTH),
-    label="anderson_ccd, mechanisms",
+ON_CHAINS, ON_MECHANISMS = kernels_of("ccd", ccd_sweep, ccd_update)
+ANDERSON_ON_CHAINS, ANDERSON_ON_MECHANISMS = kernels_of(
+    "anderson_ccd", anderson_ccd_sweep, anderson_ccd_update, DEPTH
 )

@@ -18,7 +18,6 @@ a rotation. A joint with followers goes down the gradient. The remaining distanc
 """
 
 from ..articulation import BALL, FREE, HINGE, SLIDE, joint_in_world, joint_transform
-from ..backend.compiled import Kernel
 from ..jacobians import ZERO, axis_of, frame_of
 from ..quaternion import (
     IDENTITY,
@@ -47,8 +46,7 @@ from .mechanism import (
     translate_free,
     update_forward_kinematics,
 )
-from .solve_chain import on_chains, solve_chains
-from .solve_mechanism import on_mechanisms, solve_mechanisms
+from .solve_mechanism import kernels_of
 from .wahba import ZERO_MATRIX, add_outer, add_rotation, best_angle, best_rotation
 
 # The weight of the identity in fitting a free joint, beside a single arm as long as the reach. The
@@ -323,7 +321,4 @@ def pose_below(joints, data, j, k, x, R):
     return rotate(Q, x), multiply(Q, R)
 
 
-ON_CHAINS = Kernel(solve_chains, constants=(on_chains(fabrik_sweep), 0), label="fabrik, chains")
-ON_MECHANISMS = Kernel(
-    solve_mechanisms, constants=(on_mechanisms(fabrik_update), 0), label="fabrik, mechanisms"
-)
+ON_CHAINS, ON_MECHANISMS = kernels_of("fabrik", fabrik_sweep, fabrik_update)

@@ -20,7 +20,6 @@ the same iterations on a chain of ten balls, but a solve takes nine times as lon
   functions that the interpreter can run.
 """
 
-from ..backend.compiled import Kernel
 from ..quaternion import (
     IDENTITY,
     cross,
@@ -38,8 +37,7 @@ from ..quaternion import (
 from .bounded_step import linearise_task, take_step, transposed_step
 from .chain import LINE_TOLERANCE, bend, drawn_near, update_positions
 from .far_step import step_towards
-from .solve_chain import on_chains, solve_chains
-from .solve_mechanism import on_mechanisms, solve_mechanisms
+from .solve_mechanism import kernels_of
 
 # How far beyond reach a chain's target may be, over the reach; a further target is drawn nearer.
 # Steps towards a far target would swing about the nearest point; the nearer to reach itself, the
@@ -155,23 +153,9 @@ def rotate_joints(chain, z):
     update_positions(chain)
 
 
-TRANSPOSE_ON_CHAINS = Kernel(
-    solve_chains,
-    constants=(on_chains(jacobian_transpose_sweep), 0),
-    label="jacobian_transpose, chains",
+TRANSPOSE_ON_CHAINS, TRANSPOSE_ON_MECHANISMS = kernels_of(
+    "jacobian_transpose", jacobian_transpose_sweep, jacobian_transpose_update
 )
-TRANSPOSE_ON_MECHANISMS = Kernel(
-    solve_mechanisms,
-    constants=(on_mechanisms(jacobian_transpose_update), 0),
-    label="jacobian_transpose, mechanisms",
-)
-DAMPED_ON_CHAINS = Kernel(
-    solve_chains,
-    constants=(on_chains(damped_least_squares_sweep), 0),
-    label="damped_least_squares, chains",
-)
-DAMPED_ON_MECHANISMS = Kernel(
-    solve_mechanisms,
-    constants=(on_mechanisms(damped_least_squares_update), 0),
-    label="damped_least_squares, mechanisms",
+DAMPED_ON_CHAINS, DAMPED_ON_MECHANISMS = kernels_of(
+    "damped_least_squares", damped_least_squares_sweep, damped_least_squares_update
 )

@@ -22,14 +22,12 @@ An iteration computes the errors e of the effectors and their Jacobian J. It sol
 J J' has closed entries (`jacobian.py`).
 """
 
-from ..backend.compiled import Kernel
 from ..quaternion import dot
 from .bounded_step import linearise_task, take_step
 from .far_step import step_towards
 from .jacobian import linearise, rotate_joints, solve_damped
 from .linear_algebra import ROUNDING_DAMPING, inner
-from .solve_chain import on_chains, solve_chains
-from .solve_mechanism import on_mechanisms, solve_mechanisms
+from .solve_mechanism import kernels_of
 
 # Damping over the squared error, for positions; and for rotations as well, the factor of Chan &
 # Lawrence 1988, which needs fewer iterations there. For tasks, whose radians count as metres, a
@@ -58,13 +56,6 @@ def levenberg_marquardt_update(state, target):
     take_step(mechanism, data, system)
 
 
-ON_CHAINS = Kernel(
-    solve_chains,
-    constants=(on_chains(levenberg_marquardt_sweep), 0),
-    label="levenberg_marquardt, chains",
-)
-ON_MECHANISMS = Kernel(
-    solve_mechanisms,
-    constants=(on_mechanisms(levenberg_marquardt_update), 0),
-    label="levenberg_marquardt, mechanisms",
+ON_CHAINS, ON_MECHANISMS = kernels_of(
+    "levenberg_marquardt", levenberg_marquardt_sweep, levenberg_marquardt_update
 )

@@ -18,6 +18,7 @@ from ..articulation import (
     joint_transform,
     normalise_start,
 )
+from ..backend.compiled import Kernel
 from ..quaternion import (
     load_quaternion,
     load_vector,
@@ -66,6 +67,7 @@ from .restarts import (
     solve_with_restarts,
 )
 from .result import OUTCOME, fill_figures, outcome_of, result_on
+from .solve_chain import on_chains, solve_chains
 
 # A start is stuck if it stalls within so few iterations away from its target. An example is a
 # straight chain, perhaps folded since, with its target on its own line.
@@ -359,3 +361,12 @@ def on_mechanisms(update: Any) -> Operations:
         update, residuals, merit_of, perturb_mechanism, place_mechanism, draw_mechanism,
         shift_mechanism,
     )  # fmt: skip
+
+
+def kernels_of(name: str, sweep: Any, update: Any, depth: int = 0) -> tuple[Kernel, Kernel]:
+    """Return a solver's kernels for chains and mechanisms; the solver remembers `depth` sweeps."""
+    chains, mechanisms = (on_chains(sweep), depth), (on_mechanisms(update), depth)
+    return (
+        Kernel(solve_chains, constants=chains, label=f"{name}, chains"),
+        Kernel(solve_mechanisms, constants=mechanisms, label=f"{name}, mechanisms"),
+    )
