@@ -11,9 +11,10 @@ from ..arguments import LARGEST_COORDINATE, FloatArray, choice, frozen, instance
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
 from .certificate import Certificate, certify
+from .gauss_newton import GaussNewton
 from .lbfgs import LBFGS
 from .local_global import Chebyshev, LocalGlobal
-from .newton import GaussNewton, Newton
+from .newton import Newton
 from .newton_cg import NewtonCG
 from .objective import STARTS, Iterate, Objective
 

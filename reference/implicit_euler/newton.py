@@ -1,16 +1,8 @@
-"""Newton's method on g with its exact Hessian, and Gauss-Newton.
+"""Newton's method on g with its exact Hessian.
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
 until the sum is positive definite, a Levenberg shift in the metric of M. An end is accepted only
 without a negative eigenvalue, which costs a last factorisation.
-
-Gauss-Newton linearises the springs at the start of the step (Baraff and Witkin 1998, without
-geometric stiffness; MuJoCo's integrator `discrete`):
-
-    (M + h C + h² J' k J) dv = h (f - h J' k J v_n),
-
-where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. See
-docs/implicit_euler.md.
 """
 
 from collections.abc import Iterator
@@ -78,33 +70,3 @@ class Newton:
                 return self._analysed.refactorize(hessian), shift
             except NotPositiveDefiniteError:
                 shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
-
-
-class GaussNewton:
-    """Gauss-Newton iterations from x_n, by default a single iteration."""
-
-    default_iterations = 1
-
-    def __init__(self, system: MassSpring, h: float) -> None:
-        """Analyse the sparsity pattern, which the matrices of all steps share."""
-        self._analysed = hessian_factor(system)
-
-    def iterates(self, objective: Objective) -> Iterator[Iterate]:
-        """Yield x_n with the pins at their targets, then the iterate after each iteration.
-
-        Where the matrix is singular to rounding, yield the last iterate again.
-        """
-        x = objective.x_n
-        iterate = objective.iterate_at(x)
-        gradient = iterate.gradient + objective.pin_gradient_at(x, geometric=False)
-        if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
-            iterate = objective.iterate_at(np.where(objective.system.free[:, None], x, objective.y))
-        while True:
-            yield iterate
-            try:
-                factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
-            except NotPositiveDefiniteError:  # the masses vanish beside h² k
-                continue
-            correction = factor.solve(gradient.ravel()).reshape(-1, 3)
-            iterate = objective.iterate_at(iterate.positions - correction)
-            x, gradient = iterate.positions, iterate.gradient
