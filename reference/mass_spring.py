@@ -23,6 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
+from numpy import uint64 as at
 from numpy.typing import ArrayLike
 
 from .arguments import (
@@ -378,15 +379,23 @@ def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
 def spring_pulls(x, v, system):
     """Return the forces of springs and dampers on each particle, shape (particle, 3)."""
     total = np.zeros(x.shape)
+    add_pulls(x, v, system, total)
+    return total
+
+
+def add_pulls(x, v, system, total):
+    """Add the forces of springs and dampers on each particle."""
     for s in range(len(system.springs)):
-        i, j = system.springs[s, 0], system.springs[s, 1]
-        length, u = spring_frame(x, i, j)
-        rate = dot(subtract(load_vector(v, i), load_vector(v, j)), u)
+        i, j = at(system.springs[s, 0]), at(system.springs[s, 1])
+        length, p, inverse = spring_line(x, i, j)
         stretch = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])
-        pull = scale(system.stiffnesses[s] * stretch + system.dampings[s] * rate, u)
+        tension = system.stiffnesses[s] * stretch
+        if system.dampings[s] > 0.0:
+            rate = dot(subtract(load_vector(v, i), load_vector(v, j)), p) * inverse
+            tension += system.dampings[s] * rate
+        pull = scale(tension * inverse, p)
         store_vector(total, i, subtract(load_vector(total, i), pull))
         store_vector(total, j, add(load_vector(total, j), pull))
-    return total
 
 
 def stiffness_blocks(x, system, geometric):
@@ -436,14 +445,22 @@ def is_slack(length, rest_length, tension_only):
     return tension_only and rest_length > 0.0 and length <= rest_length
 
 
-def spring_frame(x, i, j):
-    """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
+def spring_line(x, i, j):
+    """Return the length, the vector from particle j to i, and 1 over the norm of the vector.
+
+    The vector is (1, 0, 0) where the particles coincide.
+    """
     p = subtract(load_vector(x, i), load_vector(x, j))
     length = norm(p)
-    s = 1.0 / max(length, COINCIDENT)
     if length < COINCIDENT:
-        p, s = (1.0, 0.0, 0.0), 1.0
-    return length, scale(s, p)
+        return length, (1.0, 0.0, 0.0), 1.0
+    return length, p, 1.0 / length
+
+
+def spring_frame(x, i, j):
+    """Return the length and the direction from particle j to i; (1, 0, 0) where they coincide."""
+    length, p, inverse = spring_line(x, i, j)
+    return length, scale(inverse, p)
 
 
 pulls = Kernel(spring_pulls)

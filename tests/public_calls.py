@@ -230,7 +230,7 @@ def values():
             "count": 12, "min_spacing": 0.01, "max_spacing": 0.05, "masses": masses,
             "springs": SPRINGS, **per_spring, "pinned": np.array([0]), "gravity": gravity,
             "positions": positions, "velocities": velocities, "system": system, "state": state,
-            "h": 0.01, "external_forces": forces, "pin_positions": positions[:1] + 0.1,
+            "h": 0.01, "steps": 2, "external_forces": forces, "pin_positions": positions[:1] + 0.1,
             "result": result, "other": proof, "distance": 0.1,
             "triangles": np.array([[0, 1, 2], [0, 2, 3]]),
             "density": 1.2, "text": triangle,

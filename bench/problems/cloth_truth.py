@@ -73,8 +73,7 @@ def true_motion(cloth: FallingCloth, frames: int, substeps: int) -> FloatArray:
     """Return the positions by Runge-Kutta after each frame of so many steps."""
     state, positions = cloth.start, []
     for _ in range(frames):
-        for _ in range(substeps):
-            state = runge_kutta(cloth.system, state, cloth.frame / substeps)
+        state = runge_kutta(cloth.system, state, cloth.frame / substeps, steps=substeps)
         positions.append(state.positions)
     return np.array(positions)
 

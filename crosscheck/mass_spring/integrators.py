@@ -25,34 +25,27 @@ LINE_STEPS, LINE_TOLERANCE = 100, 1e-14
 Simulation = Callable[[State, ArrayLike | None, int], State]
 
 
-def explicit(
-    step: Callable[[MassSpring, State, float, ArrayLike | None], State],
-    system: MassSpring,
-    h: float,
-) -> Simulation:
+def explicit(integrator: Callable[..., State], system: MassSpring, h: float) -> Simulation:
     """Return the simulation by an explicit integrator of ours."""
-    return _repeated(lambda state, loads: step(system, state, h, loads))
+    return lambda state, loads, steps: integrator(system, state, h, loads, steps=steps)
 
 
 def implicit(solver: str, system: MassSpring, h: float, *, tolerance: float = 1e-13) -> Simulation:
     """Return the simulation by implicit Euler and a solver."""
     integrator = ImplicitEuler(system, h=h, solver=solver, tolerance=tolerance)
-    return _repeated(lambda state, loads: integrator.step(state, loads).state)
+
+    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
+        for _ in range(steps):
+            state = integrator.step(state, external_forces).state
+        return state
+
+    return simulate
 
 
 def mujoco(integrator: str, system: MassSpring, h: float) -> Simulation:
     """Return the simulation by an integrator of MuJoCo."""
     engine = MujocoMassSpring(system, h=h, integrator=integrator)
     return lambda state, loads, steps: engine.step(state, loads, steps=steps)
-
-
-def _repeated(step: Callable[[State, ArrayLike | None], State]) -> Simulation:
-    def simulate(state: State, external_forces: ArrayLike | None, steps: int) -> State:
-        for _ in range(steps):
-            state = step(state, external_forces)
-        return state
-
-    return simulate
 
 
 SIMULATORS: dict[str, Callable[[MassSpring, float], Simulation]] = {

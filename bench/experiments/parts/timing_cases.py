@@ -339,15 +339,8 @@ def stepping(problem: ClothSwing, **settings: Any) -> Callable[[], Any]:
 
 def substeps(problem: ClothSwing) -> Callable[[], Any]:
     """Return a frame of explicit substeps."""
-    start = moving(problem)
-
-    def run() -> State:
-        state = start
-        for _ in range(SUBSTEPS):
-            state = symplectic_euler(problem.system, state, h=problem.h / SUBSTEPS)
-        return state
-
-    return run
+    start, h = moving(problem), problem.h / SUBSTEPS
+    return partial(symplectic_euler, problem.system, start, h, steps=SUBSTEPS)
 
 
 def mujoco_steps(

@@ -42,14 +42,14 @@ def prepare(
     """
     h = frame / substeps
     if solver in INTEGRATORS:
-        return _Steps(partial(INTEGRATORS[solver], system, h=h), substeps)
+        return _Steps(partial(INTEGRATORS[solver], system, h=h, steps=substeps), 1)
     limits: dict[str, Any] = {"tolerance": tolerance, "max_iterations": iterations}
     integrator = ImplicitEuler(system, h=h, solver=solver, **limits)
     return _Steps(lambda state: integrator.step(state).state, substeps)
 
 
 class _Steps:
-    """So many steps a frame of a map from a state to the next."""
+    """A frame as so many applications of a map from a state to a later one."""
 
     def __init__(self, step: Callable[[State], State], substeps: int) -> None:
         self._step, self._substeps = step, substeps
