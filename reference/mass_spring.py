@@ -361,14 +361,19 @@ def damping_matrix(system: MassSpring, positions: ArrayLike) -> Any:
 
 def checked_state(system: MassSpring, state: State) -> tuple[FloatArray, FloatArray]:
     """Return copies of a state's positions and velocities, zero at the pins; else an error."""
+    check_particles(system, state)
+    v = np.array(state.velocities)
+    v[system.pinned] = 0.0
+    return np.array(state.positions), v
+
+
+def check_particles(system: MassSpring, state: State) -> None:
+    """Raise a ValueError unless a state is one of the particles of a system."""
     _system(system)
     instance("state", state, State)
     if len(state.positions) != system.particle_count:
         expected, got = system.particle_count, len(state.positions)
         raise ValueError(f"state: expected {expected} particles, got {got}")
-    v = np.array(state.velocities)
-    v[system.pinned] = 0.0
-    return np.array(state.positions), v
 
 
 def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:

@@ -170,6 +170,12 @@ def with_first(kernel: PythonKernel, constants: tuple[Any, ...]) -> PythonKernel
     return namespace[kernel.__name__]
 
 
+def relaxed(plain: PythonKernel) -> PythonKernel:
+    """Let a function be relaxed in whatever kernel calls it, as `Kernel` lets a whole kernel be."""
+    plain.relaxed = True
+    return plain
+
+
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
     """Return a decorator of functions whose compiled versions are in another module.
 
@@ -223,7 +229,7 @@ def _compiled_global(value: Any, relaxed: bool, inline: bool, inlined_size: int)
     if not isinstance(value, types.FunctionType):
         return value._make(_compiled_global(k, relaxed, True, inlined_size) for k in value)
     inline |= _inlined_size(value) <= inlined_size
-    return _callee(value, relaxed, inline, inlined_size)
+    return _callee(value, relaxed or hasattr(value, "relaxed"), inline, inlined_size)
 
 
 def _calls(kernel: PythonKernel) -> Counter[str]:
@@ -311,7 +317,7 @@ def _collect(kernel: PythonKernel, parts: list[bytes], visited: set[Any]) -> Non
         return
     visited.add(kernel)
     _collect_code(kernel.__code__, parts)
-    parts.append(repr(kernel.__defaults__).encode())
+    parts.append(repr((kernel.__defaults__, hasattr(kernel, "relaxed"))).encode())
     if hasattr(kernel, "compiled_in"):
         parts.append(_module_fingerprint(kernel.compiled_in))
     for name, value in _named_globals(kernel):

@@ -7,8 +7,15 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import LARGEST_COORDINATE, FloatArray, choice, frozen, instance, integer, number
-from ..mass_spring import MassSpring, State
+from ..arguments import FloatArray, choice, frozen, instance, integer, number
+from ..backend.compiled import Kernel
+from ..mass_spring import (
+    MassSpring,
+    State,
+    check_particles,
+    constant_forces,
+    pin_targets,
+)
 from ..outcome import Outcome
 from .certificate import Certificate, certify
 from .gauss_newton import GaussNewton
@@ -17,6 +24,8 @@ from .local_global import Chebyshev, LocalGlobal
 from .newton import Newton
 from .newton_cg import NewtonCG
 from .objective import STARTS, Iterate, Objective
+from .stopping import DIVERGED, GO_ON, outcome_at
+from .terms import step_end
 
 
 class StepMethod(Protocol):
@@ -44,10 +53,12 @@ STEP_SOLVERS: dict[str, type[StepMethod]] = {
     "gauss_newton": GaussNewton,
 }
 
-# Stop early if the least residual is at least PATIENCE iterations and PATIENCE_RATIO of all
-# iterations old. The residual of an accelerated solver oscillates, with a period that grows as its
-# convergence slows down.
-PATIENCE, PATIENCE_RATIO = 3, 0.25
+OUTCOMES = tuple(Outcome)
+NO_PINS = np.empty((0, 3))
+# Positions and velocities at the end of a step, (2, particle, 3); residuals and values of g before
+# and after each iteration, (2, iterations + 1), none on overflow; whether the gradient is at the
+# floor; the outcome.
+StepEnd = tuple[FloatArray, FloatArray, bool, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +145,12 @@ class ImplicitEuler:
             ValueError: if the state has another number of particles, or the external forces or pin
                 positions have another shape or are not finite.
         """
-        with np.errstate(over="ignore", invalid="ignore"):  # overflow ends in DIVERGED
-            objective = self.objective(state, external_forces, pin_positions)
-            return self._solve(state, objective)
+        if isinstance(self._solver, Newton):
+            end = self._newton_step(self._solver, state, external_forces, pin_positions)
+        else:
+            with np.errstate(over="ignore", invalid="ignore"):  # overflow ends in DIVERGED
+                end = self._minimised(self.objective(state, external_forces, pin_positions))
+        return _result(state, *end)
 
     def objective(
         self,
@@ -178,61 +192,68 @@ class ImplicitEuler:
         """
         return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 
-    def _solve(self, state: State, objective: Objective) -> StepResult:
-        """Return the result of the last finite iterate, or the initial state on overflow."""
+    def _newton_step(
+        self,
+        solver: Newton,
+        state: State,
+        external_forces: ArrayLike | None,
+        pin_positions: ArrayLike | None,
+    ) -> StepEnd:
+        """Return the end of a step by Newton's method in a kernel."""
+        system = self.system
+        check_particles(system, state)
+        external = system.weights
+        if external_forces is not None:
+            external = constant_forces(system, external_forces)
+        targets = NO_PINS if pin_positions is None else pin_targets(system, pin_positions)
+        stop = self.tolerance, self._iteration_limit
+        start = self.start == "x_n"
+        return solver.step(
+            state.positions, state.velocities, external, targets, self.h, stop, start
+        )
+
+    def _minimised(self, objective: Objective) -> StepEnd:
+        """Return the end of a step by the solver's iterates."""
         last: Iterate | None = None
         residuals: list[float] = []
         objectives: list[float] = []
-        best, outcome = 0, None
+        best, outcome, stop = 0, GO_ON, (self.tolerance, self._iteration_limit)
         for iterate in self._solver.iterates(objective) if objective.inertial.finite else ():
             if not iterate.finite:
                 break
             residuals.append(objective.residual(iterate))
             objectives.append(iterate.value)
-            is_stuck, last = iterate is last, iterate
+            is_stuck, last, count = iterate is last, iterate, len(residuals) - 1
             if residuals[-1] < residuals[best]:
-                best = len(residuals) - 1
-            outcome = self._outcome(objective, iterate, residuals, best, is_stuck)
-            if outcome is not None:
+                best = count
+            outcome, _ = outcome_at(
+                *(count, stop, residuals[-1], best, is_stuck),
+                *(iterate.at_floor, iterate.at_rest),
+            )
+            if outcome != GO_ON:
                 break
-        if last is not None:
-            velocities = last.positions - objective.x_n
-            velocities /= objective.h
-            if np.abs([last.positions, velocities]).max() <= LARGEST_COORDINATE:
-                return StepResult(
-                    state=State.of(last.positions, velocities),
-                    residual=residuals[-1],
-                    iterations=len(residuals) - 1,
-                    outcome=Outcome.DIVERGED if outcome is None else outcome,
-                    at_floor=last.at_floor,
-                    history=frozen(np.array(residuals)),
-                    objectives=frozen(np.array(objectives)),
-                )
+        x = objective.x_n if last is None else last.positions
+        end = _step_end(objective.x_n, x, self.h, np.array([residuals, objectives]))
+        at_floor = last is not None and last.at_floor
+        return *end, at_floor, DIVERGED if outcome == GO_ON else outcome
+
+
+def _result(
+    state: State, end: FloatArray, history: FloatArray, at_floor: bool, outcome: int
+) -> StepResult:
+    """Return the result of a step from a state, the state itself on overflow."""
+    if len(history[0]) == 0:
         infinite = frozen(np.array([np.inf]))
         return StepResult(state, np.inf, 0, Outcome.DIVERGED, False, infinite, infinite)
+    return StepResult(
+        state=State.of(end[0], end[1]),
+        residual=float(history[0, -1]),
+        iterations=len(history[0]) - 1,
+        outcome=OUTCOMES[outcome],
+        at_floor=at_floor,
+        history=frozen(history[0]),
+        objectives=frozen(history[1]),
+    )
 
-    def _outcome(
-        self, objective: Objective, iterate: Iterate, residuals: list[float], best: int, stuck: bool
-    ) -> Outcome | None:
-        """Return the outcome if the solver stops at this iterate, else None.
 
-        The floor is an upper bound, often a thousand times the actual rounding error. A gradient
-        below the floor therefore stops the solver only if the start is at rest, or once the least
-        residual, at index `best`, is no longer improved. Newton's method goes on from an indefinite
-        Hessian as long as possible.
-        """
-        count = len(residuals) - 1
-        final = count >= self._iteration_limit
-        if self.tolerance > 0 or final:
-            since, converged = count - best, residuals[-1] <= self.tolerance
-            ended = stuck or (since >= PATIENCE and since >= PATIENCE_RATIO * count)
-            at_rest = (ended and iterate.at_floor) or (count == 0 and iterate.at_rest)
-            if converged or at_rest:
-                newton = self._solver if isinstance(self._solver, Newton) else None
-                if not (newton and newton.is_saddle(objective, iterate)):
-                    return Outcome.CONVERGED if converged else Outcome.AT_ROUNDING
-                if at_rest or stuck or final:
-                    return Outcome.SADDLE
-            if stuck:
-                return Outcome.STALLED
-        return Outcome.ITERATION_LIMIT if final else None
+_step_end = Kernel(step_end)

@@ -21,23 +21,20 @@ import scipy
 from numpy.typing import ArrayLike
 
 from ..arguments import BoolArray, FloatArray, IndexArray, coordinates, instance, number
+from ..backend.compiled import Kernel
 from ..mass_spring import lengths
 from ..outcome import SentenceEnum
 from ..sparse import CholeskyFactor, NotPositiveDefiniteError
 from .objective import Objective
+from .terms import hessian_rounding
 
 EPS = float(np.finfo(float).eps)
 # A term of the gradient takes at most 27 roundings of EPS/2 each: 27 / 2 < 16.
 GRADIENT_ROUNDING = 16
-# An entry of a spring's block takes at most 60, and the norm of a block is at most three times its
-# largest entry: 3 * 60 / 2 < 128.
-HESSIAN_ROUNDING = 128
 # Factor to cover the rounding errors of the bounds themselves, for millions of particles.
 SLACK = 1.0 + 1e-8
 # The norm of the third derivative of the length |p| is this over |p|².
 THIRD_DERIVATIVE = 2.0 / math.sqrt(3.0)
-# Least length [m] to divide by: its square is above the smallest normal number, 2.2e-308.
-TINY = 1e-150
 # The first shift tried as a lower bound of the smallest eigenvalue, relative to its estimate, and
 # the relative accuracy of the estimate. The shift leaves out twice the error of the estimate.
 FIRST_SHIFT, ESTIMATE_TOLERANCE = 0.98, 1e-2
@@ -249,18 +246,13 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     coordinate_norms = _norms(x) + _norms(objective.y) + _norms(objective.x_n)
     loads = _norms(objective.external) + m * np.linalg.norm(system.gravity)
     pulls = k * (length + rest_terms)
-    acts = (k > 0) & (rest_terms > 0) & free[springs].any(axis=1)
-    acts &= ~(objective.effective.tension_only & (length < objective.effective.rest_lengths))
-    geometric = np.zeros_like(length)
-    geometric[acts] = rest_terms[acts] / np.maximum(length[acts], TINY)
-    blocks = 2.0 * k * (1.0 + geometric)
     gradient = m * coordinate_norms + h * h * loads
     gradient += _sum_over_springs(len(m), springs, pulls, pulls)
-    hessian = m + _sum_over_springs(len(m), springs, blocks, blocks)
+    rest_lengths = objective.system.with_separate_dampers.rest_lengths
     most_springs = int(np.bincount(springs.ravel(), minlength=1).max())
     return RoundingErrors(
         (GRADIENT_ROUNDING + most_springs) * EPS * float(np.linalg.norm(gradient[free])),
-        (HESSIAN_ROUNDING + most_springs) * EPS * float(hessian[free].max()),
+        _hessian_rounding(x, rest_lengths, objective.terms, free, most_springs),
     )
 
 
@@ -289,3 +281,6 @@ def _sum_over_springs(
 
 def _norms(vectors: FloatArray) -> FloatArray:
     return np.linalg.norm(vectors, axis=1)
+
+
+_hessian_rounding = Kernel(hessian_rounding)

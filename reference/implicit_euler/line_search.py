@@ -8,7 +8,9 @@ Guaranteed Descent".
 import numpy as np
 
 from ..arguments import FloatArray
+from ..backend.compiled import Kernel
 from .objective import Iterate, Objective
+from .terms import evaluate_objective, rounding_bounds
 
 # Least decrease relative to the slope's prediction, the usual choice (Nocedal & Wright 2006, 3.1).
 ARMIJO = 1e-4
@@ -17,18 +19,40 @@ HALVINGS = 40
 
 
 def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
-    """Return an acceptable iterate along a descent step, or the start if there is none.
+    """Return an acceptable iterate along a descent step, or the start if there is none."""
+    at = start.positions, start.gradient, start.value
+    *end, found = _search(*at, step, objective.terms)
+    return objective.iterate_of(*end) if found else start
 
-    It is acceptable if g decreased enough or, within rounding, if the slope at the end is small.
+
+def search_line(x, gradient, value, step, terms):
+    """Return positions along a descent step, gradient, g, norm and reach, and whether acceptable.
+
+    They are acceptable if g decreased enough or, within rounding, if the slope there is small.
     """
-    slope, length = float(np.sum(start.gradient * step)), 1.0
+    slope, length, end = inner_product(gradient, step), 1.0, np.empty(x.shape)
     for _ in range(HALVINGS):
-        end = objective.iterate_at(start.positions + length * step)
-        rise = end.value - start.value
-        if rise <= ARMIJO * length * slope or (
-            rise <= end.value_floor
-            and float(np.sum(end.gradient * step)) <= (2 * ARMIJO - 1) * slope
-        ):
-            return end
-        length /= 2
-    return start
+        for i in range(len(x)):
+            for c in range(3):
+                end[i, c] = x[i, c] + length * step[i, c]
+        end_gradient, end_value, norm, reach = evaluate_objective(end, *terms)
+        rise = end_value - value
+        found = rise <= ARMIJO * length * slope
+        if not found and inner_product(end_gradient, step) <= (2.0 * ARMIJO - 1.0) * slope:
+            found = rise <= rounding_bounds(end, *terms)[1]
+        if found:
+            break
+        length /= 2.0
+    return end, end_gradient, end_value, norm, reach, found
+
+
+def inner_product(a, b):
+    """Return the sum of the products of entries of two arrays (particle, 3)."""
+    total = 0.0
+    for i in range(len(a)):
+        for c in range(3):
+            total += a[i, c] * b[i, c]
+    return total
+
+
+_search = Kernel(search_line)

@@ -32,6 +32,7 @@ from .terms import (
     blend_dampers,
     evaluate_objective,
     evaluate_regions,
+    is_finite,
     join_regions,
     rounding_bounds,
     rounding_coefficients,
@@ -50,7 +51,6 @@ class Iterate:
     gradient_norm: float  # |grad g(x)|
     floor_bound: float  # an upper bound of `floor` that is cheaper to compute
     rounding_of: Callable[[FloatArray], tuple[float, float]]  # of the norm and of g at x
-    is_convex: bool = False  # whether Newton found the Hessian positive definite on its way here
 
     @functools.cached_property
     def _rounding(self) -> tuple[float, float]:
@@ -69,8 +69,7 @@ class Iterate:
     @property
     def finite(self) -> bool:
         """Whether g, its gradient and the terms of the floor are finite."""
-        terms = self.floor_bound / SUM_ROUNDING
-        return math.isfinite(self.value + self.gradient_norm + terms * terms)
+        return is_finite(self.value, self.gradient_norm, self.floor_bound)
 
     @property
     def at_floor(self) -> bool:
@@ -121,6 +120,7 @@ class Objective:
         effective: the system with its dampers replaced by springs, as above; the dampers of
             tension-only springs follow all other springs.
         inertial: the iterate at y, to which residuals are relative.
+        terms: the arguments of kernels after the positions.
     """
 
     def __init__(
@@ -152,7 +152,7 @@ class Objective:
         arrays = self.effective.arrays
         particles = self.y, self.external, arrays.masses
         elastic = arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only
-        self._arguments = h, constant, particles, arrays.springs, elastic, arrays.pinned
+        self.terms = h, constant, particles, arrays.springs, elastic, arrays.pinned
         self._floor_coefficients = _rounding_coefficients(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )
@@ -174,17 +174,19 @@ class Objective:
         """Return g and its gradient at positions neither checked nor copied."""
         regions = self.system.with_separate_dampers.regions
         if regions is None:
-            terms = _evaluate(positions, *self._arguments)
-        else:
-            terms = _evaluate_in_parallel(positions, self._arguments, regions)
-        gradient, value, norm, reach = terms
+            return self.iterate_of(positions, *_evaluate(positions, *self.terms))
+        return self.iterate_of(positions, *_evaluate_in_parallel(positions, self.terms, regions))
+
+    def iterate_of(
+        self, x: FloatArray, gradient: FloatArray, value: float, norm: float, reach: float
+    ) -> Iterate:
+        """Return the iterate of positions and what `evaluate_objective` returns for them."""
         a, b = self._floor_coefficients
-        return Iterate(positions, gradient, value, norm, a + b * reach, self._rounding)
+        return Iterate(x, gradient, value, norm, a + b * reach, self._rounding)
 
     def _rounding(self, positions: FloatArray) -> tuple[float, float]:
         """Return bounds on the rounding errors of the gradient's norm and of g."""
-        h, _, *terms = self._arguments
-        return _rounding_bounds(positions, h, *terms)
+        return _rounding_bounds(positions, *self.terms)
 
     def residual(self, iterate: Iterate) -> float:
         """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y."""

@@ -9,6 +9,7 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
+from ..arguments import LARGEST_COORDINATE
 from ..mass_spring import spring_frame, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
@@ -16,8 +17,68 @@ EPS = float(np.finfo(float).eps)
 # Bound on the rounding error of the gradient, relative to the norm of its terms. A term is known to
 # 14 EPS (see `certificate`), and the sum of 100 springs at a particle to 50 EPS.
 SUM_ROUNDING = 64 * EPS
+# The rounding error of a Hessian, in EPS: an entry of a spring's block takes at most 60 roundings
+# of EPS/2, and the norm of a block is at most three times its largest entry: 3 * 60 / 2 < 128.
+HESSIAN_ROUNDING = 128
+# Least length [m] to divide by: its square is above the smallest normal number, 2.2e-308.
+TINY = 1e-150
 # Covers the rounding error of the upper bound of the floor itself.
 MARGIN = 1.000001
+
+
+def inertial_positions(x_n, v_n, h, pinned, targets):
+    """Return y = x_n + h v_n, with the pins at their targets, or at x_n if there are none."""
+    y = np.empty(x_n.shape)
+    for i in range(len(y)):
+        for c in range(3):
+            y[i, c] = x_n[i, c] + h * v_n[i, c]
+    for p in range(len(pinned)):
+        for c in range(3):
+            y[pinned[p], c] = targets[p, c] if len(targets) > 0 else x_n[pinned[p], c]
+    return y
+
+
+def start_at(x_n, y, free):
+    """Return x_n with the pins where y has them."""
+    x = y.copy()
+    for i in range(len(x)):
+        if free[i]:
+            for c in range(3):
+                x[i, c] = x_n[i, c]
+    return x
+
+
+def step_end(x_n, x, h, history):
+    """Return positions and velocities (x - x_n) / h, (2, particle, 3), and the step's history.
+
+    The history is empty where a number exceeds LARGEST_COORDINATE.
+    """
+    end, bounded = np.empty((2, len(x), 3)), True
+    for i in range(len(x)):
+        for c in range(3):
+            end[0, i, c], end[1, i, c] = x[i, c], (x[i, c] - x_n[i, c]) / h
+            for values in end:
+                bounded = bounded and abs(values[i, c]) <= LARGEST_COORDINATE
+    return end, (history if bounded else np.empty((2, 0)))
+
+
+def is_finite(value, gradient_norm, floor_bound):
+    """Return whether g, the norm of its gradient and the terms of the floor are finite."""
+    terms = floor_bound / SUM_ROUNDING
+    return math.isfinite(value + gradient_norm + terms * terms)
+
+
+def standing(x, norm, bound, terms, first):
+    """Return the residual at x, whether the gradient is at the floor, and whether at rest.
+
+    `norm` is the gradient's, `bound` that of the floor, and `first` the norm at y.
+    """
+    at_floor, at_rest, scale = False, False, first
+    if norm <= bound or first < bound:
+        floor = rounding_bounds(x, *terms)[0]
+        at_floor, at_rest = norm <= floor, norm <= EPS / SUM_ROUNDING * floor
+        scale = max(first, floor)
+    return 0.0 if norm == 0.0 else norm / scale, at_floor, at_rest
 
 
 def blend_dampers(x_n, h, stiffnesses, system):
@@ -125,7 +186,7 @@ def zero_pins(pinned, gradient):
     return math.sqrt(squares)
 
 
-def rounding_bounds(x, h, particles, springs, elastic, pinned):
+def rounding_bounds(x, h, constant, particles, springs, elastic, pinned):
     """Return upper bounds of the rounding errors of |grad g| and of g."""
     (y, external, masses), (rest_lengths, stiffnesses, tension_only) = particles, elastic
     size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
@@ -152,6 +213,27 @@ def rounding_bounds(x, h, particles, springs, elastic, pinned):
     for i in range(len(x)):
         squares += size[i] * size[i]
     return SUM_ROUNDING * math.sqrt(squares), SUM_ROUNDING * value_size
+
+
+def hessian_rounding(x, rest_lengths, terms, free, most_springs):
+    """Return an upper bound of the rounding error of the Hessian at x, in norm [kg].
+
+    The error includes that of the effective rest lengths, relative to these and the given ones.
+    """
+    h, _, (_, _, masses), springs, (effective, stiffnesses, tension_only), _ = terms
+    sizes, largest = masses.copy(), 0.0
+    for s in range(len(springs)):
+        i, j, k = springs[s, 0], springs[s, 1], h * h * stiffnesses[s]
+        length, _ = spring_frame(x, i, j)
+        rest, share = rest_lengths[s] + effective[s], 0.0
+        if rest > 0.0 and not (tension_only[s] and length < effective[s]):
+            share = rest / max(length, TINY)
+        sizes[i] += 2.0 * k * (1.0 + share)
+        sizes[j] += 2.0 * k * (1.0 + share)
+    for i in range(len(sizes)):
+        if free[i]:
+            largest = max(largest, sizes[i])
+    return (HESSIAN_ROUNDING + most_springs) * EPS * largest
 
 
 def rounding_coefficients(y, external, h, masses, spring_sums, free):

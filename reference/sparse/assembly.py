@@ -37,6 +37,11 @@ class BlockSum:
         return wide, np.flatnonzero(wide.indices == columns)
 
     @property
+    def places(self) -> tuple[IndexArray, IndexArray, IndexArray]:
+        """The arguments of `sum_blocks` after the blocks."""
+        return self._places, self._ends, self._starts
+
+    @property
     def diagonal(self) -> IndexArray:
         """The places of the diagonal of `matrix` in its data, shape (3 particle,)."""
         return self._wide[1]

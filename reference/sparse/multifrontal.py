@@ -15,10 +15,13 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
+from ..backend.compiled import relaxed
+
 PANEL = 64  # rows eliminated one by one before the rest is updated
 STRIP = 256  # columns updated together, so that those of a panel stay in a near cache
 
 
+@relaxed
 def factorize(graph, order, place, blocks, updates, data, values):
     """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
     work, stack = np.empty(blocks.tallest * blocks.tallest), np.empty(updates.highest)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import uint64 as at
 
+from ..backend.compiled import relaxed
 from ..backend.simd.vectors import load_row, prefetch, scale_row, store_row, subtract_scaled
 
 # Right-hand sides solved together, and the doubles of a register with an unknown of each.
@@ -23,6 +24,7 @@ NEAR, AHEAD = 2**20, 1024
 LINE = 8  # entries that come from memory together
 
 
+@relaxed
 def solve(order, columns, starts, rows, values, b, y, x):
     """Solve A x = b for three right-hand sides: fill x, (n, 3); y is workspace, (n, 4).
 
