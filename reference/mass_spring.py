@@ -405,20 +405,26 @@ def add_pulls(x, v, system, total):
 
 def stiffness_blocks(x, system, geometric):
     """Return the 3 x 3 stiffness of each spring, zero if slack; see `stiffness_matrix`."""
-    blocks = np.zeros((len(system.springs), 3, 3))
-    for s in range(len(system.springs)):
-        i, j = system.springs[s, 0], system.springs[s, 1]
-        length, u = spring_frame(x, i, j)
-        if is_slack(length, system.rest_lengths[s], system.tension_only[s]):
-            continue
-        k, transverse = system.stiffnesses[s], 0.0
-        if geometric:
-            transverse = k * transverse_share(length, system.rest_lengths[s])
-        for a in range(3):
-            blocks[s, a, a] = transverse
-            for b in range(3):
-                blocks[s, a, b] += (k - transverse) * (u[a] * u[b])
+    blocks = np.empty((len(system.springs), 3, 3))
+    elastic = system.rest_lengths, system.stiffnesses, system.tension_only
+    fill_blocks(x, system.springs, elastic, 1.0, geometric, blocks)
     return blocks
+
+
+def fill_blocks(x, springs, elastic, factor, geometric, blocks):
+    """Fill an array with the stiffness of each spring times a factor."""
+    rest_lengths, stiffnesses, tension_only = elastic
+    for s in range(len(springs)):
+        length, u = spring_frame(x, springs[s, 0], springs[s, 1])
+        k, transverse = factor * stiffnesses[s], 0.0
+        if is_slack(length, rest_lengths[s], tension_only[s]):
+            k = 0.0
+        if geometric:
+            transverse = k * transverse_share(length, rest_lengths[s])
+        for a in range(3):
+            for b in range(3):
+                blocks[s, a, b] = (k - transverse) * (u[a] * u[b])
+            blocks[s, a, a] += transverse
 
 
 def transverse_share(length, rest_length):

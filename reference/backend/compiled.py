@@ -35,7 +35,7 @@ BACKENDS = ("numba", "python")
 # Optimisations allowed for relaxed kernels; infinities and NaN keep their meaning.
 RELAXATIONS = {"reassoc", "contract", "nsz"}
 # Names in kernels that make arrays, or views that a kernel returns.
-ALLOCATING = {"np", "copy", "reshape"}
+ALLOCATING = {"np", "copy", "reshape", "view"}
 # The largest size of callees always inlined, in the interpreter's instructions.
 INLINED_SIZE = 5000
 # The interpreter's instructions that read a global.
@@ -176,6 +176,12 @@ def relaxed(plain: PythonKernel) -> PythonKernel:
     return plain
 
 
+def uncounted(plain: PythonKernel) -> PythonKernel:
+    """Say that a function with a name in `ALLOCATING` only views arrays, and returns none."""
+    plain.uncounted = True
+    return plain
+
+
 def compiled_in(module: str) -> Callable[[PythonKernel], PythonKernel]:
     """Return a decorator of functions whose compiled versions are in another module.
 
@@ -254,6 +260,8 @@ def allocates(kernel: PythonKernel) -> bool:
     the time where a tuple holds many arrays. For a wrong answer numba would report an error.
     """
     names = {name for code in _code_objects(kernel.__code__) for name in code.co_names}
+    if hasattr(kernel, "uncounted"):
+        return False
     return bool(ALLOCATING & names) or any(
         allocates(callee) for _, callee in _callees(kernel) if not hasattr(callee, "compiled_in")
     )

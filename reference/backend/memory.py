@@ -22,11 +22,11 @@ def packed(*arrays: np.ndarray) -> FloatArray:
         rows.append(np.frombuffer(content + bytes(-len(content) % 8)))
         ends.append(ends[-1] + len(rows[-1]))
     places = zip(pairwise(ends), arrays, strict=True)
-    table = np.array([(*place, values.size) for place, values in places], dtype=np.int64)
-    return np.concatenate([table.reshape(-1).view(np.float64), *rows])
+    table = [number for place, values in places for number in (*place, values.size)]
+    return np.concatenate([np.array(table, dtype=np.float64), *rows])
 
 
 def part(memory, i, kind):
     """Return the i-th array of a block as a row of a kind of entries, in place."""
-    table = memory[3 * i : 3 * i + 3].view(np.int64)
-    return memory[table[0] : table[1]].view(kind)[: table[2]]
+    begin, end, length = int(memory[3 * i]), int(memory[3 * i + 1]), int(memory[3 * i + 2])
+    return memory[begin:end].view(kind)[:length]

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from .objective import Iterate, Objective
-from .terms import evaluate_objective, rounding_bounds
+from .terms import fill_gradient, rounding_sums
 
 # Least decrease relative to the slope's prediction, the usual choice (Nocedal & Wright 2006, 3.1).
 ARMIJO = 1e-4
@@ -21,29 +21,42 @@ HALVINGS = 40
 def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
     """Return an acceptable iterate along a descent step, or the start if there is none."""
     at = start.positions, start.gradient, start.value
-    *end, found = _search(*at, step, objective.terms)
+    end, found = _search(at, step, objective.terms)
     return objective.iterate_of(*end) if found else start
 
 
-def search_line(x, gradient, value, step, terms):
+def search_line(start, step, terms):
     """Return positions along a descent step, gradient, g, norm and reach, and whether acceptable.
+
+    `start` is of positions, gradient and g.
+    """
+    end, end_gradient = np.empty(step.shape), np.empty(step.shape)
+    room = np.empty(len(step)), np.empty(len(step))
+    numbers, found = fill_end(start, step, terms, end, end_gradient, room)
+    return (end, end_gradient, *numbers), found
+
+
+def fill_end(start, step, terms, end, end_gradient, room):
+    """Fill in positions and gradient, and return the rest of `search_line`.
 
     They are acceptable if g decreased enough or, within rounding, if the slope there is small.
     """
-    slope, length, end = inner_product(gradient, step), 1.0, np.empty(x.shape)
+    x, gradient, value = start
+    slope, length = inner_product(gradient, step), 1.0
+    end_value, norm, reach, found = value, 0.0, 0.0, False
     for _ in range(HALVINGS):
         for i in range(len(x)):
             for c in range(3):
                 end[i, c] = x[i, c] + length * step[i, c]
-        end_gradient, end_value, norm, reach = evaluate_objective(end, *terms)
+        end_value, norm, reach = fill_gradient(end, terms, end_gradient)
         rise = end_value - value
         found = rise <= ARMIJO * length * slope
         if not found and inner_product(end_gradient, step) <= (2.0 * ARMIJO - 1.0) * slope:
-            found = rise <= rounding_bounds(end, *terms)[1]
+            found = rise <= rounding_sums(end, terms, *room)[1]
         if found:
             break
         length /= 2.0
-    return end, end_gradient, end_value, norm, reach, found
+    return (end_value, norm, reach), found
 
 
 def inner_product(a, b):

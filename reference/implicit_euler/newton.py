@@ -5,6 +5,7 @@ until the sum is positive definite, a Levenberg shift in the metric of M. An end
 without a negative eigenvalue, which may cost a last factorisation.
 """
 
+import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -13,25 +14,26 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..backend.memory import packed, part
-from ..mass_spring import MassSpring, SystemArrays, stiffness_blocks, sum_springs
-from ..sparse.assembly import sum_blocks
+from ..mass_spring import MassSpring, SystemArrays, fill_blocks, sum_springs
+from ..quaternion import load_vector, store_vector
+from ..sparse.assembly import add_blocks
 from ..sparse.dissection import Graph
-from ..sparse.multifrontal import factorize
+from ..sparse.multifrontal import Scratch, eliminate_fronts, scratch_for
 from ..sparse.symbolic import Supernodes, SymbolicFactor, UpdateTree
 from ..sparse.triangular import REGISTER, RIGHT_HAND_SIDES, solve
 from .factor_cache import hessian_factor
-from .line_search import search_line
+from .line_search import fill_end
 from .objective import Iterate, Objective, effective_stiffnesses
 from .stopping import AT_ROUNDING, CONVERGED, DIVERGED, GO_ON, SADDLE, outcome_at
 from .terms import (
     blend_dampers,
-    evaluate_objective,
-    hessian_rounding,
+    fill_gradient,
+    hessian_error,
     inertial_positions,
     is_finite,
+    move_free,
     rounding_coefficients,
     standing,
-    start_at,
     step_end,
 )
 
@@ -61,7 +63,7 @@ class Newton:
         while True:
             yield iterate
             start = iterate.positions, iterate.gradient, iterate.value
-            *end, found, shift = _iteration(self._memory, start, objective.terms, shift)
+            end, found, shift = _iteration(self._memory, start, objective.terms, shift)
             iterate = objective.iterate_of(*end) if found else iterate
 
 
@@ -163,131 +165,158 @@ def newton_step(memory, x_n, v_n, external, targets, h, stop, from_x_n):
     terms = h, constant, (y, external, system.masses), system.springs, elastic, system.pinned
     sums = sum_springs(system.masses, system.springs, rest_lengths, model.stiffnesses)
     floor = rounding_coefficients(y, external, h, system.masses, sums, model.free)
-    x, start = y, evaluate_objective(y, *terms)
-    first = start[2]
-    history, at_floor, outcome = np.empty((2, 0)), False, DIVERGED
-    if is_finite(start[1], first, floor[0] + floor[1] * start[3]):
-        if from_x_n:
-            x = start_at(x_n, y, model.free)
-            start = evaluate_objective(x, *terms)
-        x, history, at_floor, outcome = minimise(model, (x, *start), terms, (first, *floor), stop)
-    return *step_end(x_n, x, h, history), at_floor, outcome
+    work, history, x = work_for(model, len(y)), np.empty((2, stop[1] + 1)), y.copy()
+    start = x_n, x, from_x_n
+    count, at_floor, outcome = minimise(model, work, start, terms, floor, history, stop)
+    return *step_end(x_n, x, h, history[:, : count + 1].copy()), at_floor, outcome
 
 
-def minimise(model, start, terms, scale, stop):
-    """Iterate from a start until `outcome_at` says so; return as `newton_step` does.
+class Work(NamedTuple):
+    """What an iteration writes to."""
 
-    `start` is of positions, gradient, g, the gradient's norm and the reach; `scale` of the norm at
-    y, to which residuals are relative, and the coefficients of the floor.
+    blocks: np.ndarray  # of the springs, (spring, 3, 3)
+    data: np.ndarray  # of the Hessian
+    unshifted: np.ndarray  # its diagonal, (3 particle,)
+    values: np.ndarray  # of the factor
+    scratch: Scratch
+    right: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
+    unknowns: np.ndarray  # (3 particle, REGISTER)
+    solution: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
+    gradient: np.ndarray  # all of (particle, 3)
+    step: np.ndarray
+    end: np.ndarray
+    end_gradient: np.ndarray
+    room: tuple[np.ndarray, np.ndarray]  # see `rounding_sums`
+
+
+def work_for(model, n):
+    """Return room for the iterations of n particles."""
+    pattern = model.factor
+    return Work(
+        np.empty((len(model.places), 3, 3)),
+        np.empty(9 * model.starts[n]),
+        np.empty(3 * n),
+        np.empty(pattern.updates.entries),
+        scratch_for(pattern.blocks, pattern.updates, 3 * n),
+        np.zeros((3 * n, RIGHT_HAND_SIDES)),
+        np.empty((3 * n, REGISTER)),
+        np.empty((3 * n, RIGHT_HAND_SIDES)),
+        np.empty((n, 3)),
+        np.empty((n, 3)),
+        np.empty((n, 3)),
+        np.empty((n, 3)),
+        (np.empty(n), np.empty(n)),
+    )
+
+
+def minimise(model, work, start, terms, floor, history, stop):
+    """Iterate until `outcome_at` says so; return the number of iterations, at_floor, the outcome.
+
+    `start` is of x_n, of x, which is y and becomes the end, and of whether to start at x_n. `floor`
+    is of the coefficients of the floor. The number of iterations is -1 if the start overflows.
     """
-    x, gradient, value, norm, reach = start
-    history, count, best = np.empty((2, 16)), -1, 0
-    shift, last_shift, found, at_floor, outcome = 0.0, np.inf, True, False, GO_ON
-    convex = False
-    end, end_gradient = x, gradient
+    (x_n, x, from_x_n), gradient = start, work.gradient
+    value, norm, reach = fill_gradient(x, terms, gradient)
+    first, count, best, at_floor, outcome = norm, -1, 0, False, GO_ON
+    shift, found, convex = 0.0, True, False
+    if from_x_n and is_finite(value, norm, floor[0] + floor[1] * reach):
+        move_free(x, x_n, model.free)
+        value, norm, reach = fill_gradient(x, terms, gradient)
     while outcome == GO_ON:
-        bound = scale[1] + scale[2] * reach
+        bound = floor[0] + floor[1] * reach
         if not is_finite(value, norm, bound):
-            outcome = DIVERGED
-            break
-        x, gradient, count = end, end_gradient, count + 1
-        residual, at_floor, at_rest = standing(x, norm, bound, terms, scale[0])
-        if count == history.shape[1]:
-            history = np.concatenate((history, np.empty(history.shape)), axis=1)
+            return count, at_floor, DIVERGED
+        if count >= 0 and found:
+            overwrite(x, work.end)
+            overwrite(gradient, work.end_gradient)
+        count += 1
+        residual, at_floor, at_rest = standing(x, norm, bound, terms, first, work.room)
         history[0, count], history[1, count] = residual, value
         if residual < history[0, best]:
             best = count
         outcome, at_end = outcome_at(count, stop, residual, best, not found, at_floor, at_rest)
         solved = outcome in (CONVERGED, AT_ROUNDING)
-        if solved and not convex and is_saddle(model, x, terms):
+        if solved and not convex and is_saddle(model, work, x, terms):
             outcome = SADDLE if at_end else GO_ON
         if outcome == GO_ON:
-            result = newton_iteration(model, (x, gradient, value), terms, shift)
-            found, shift = result[5], result[6]
+            before = shift if count > 0 else math.inf
+            start = x, gradient, value
+            end, found, shift = newton_iteration(model, work, start, terms, shift)
+            convex = shift == 0.0 and before == 0.0
             if found:
-                end, end_gradient, value, norm, reach = result[:5]
-            convex, last_shift = shift == 0.0 and last_shift == 0.0, shift
-    return x, history[:, : count + 1].copy(), at_floor, outcome
+                value, norm, reach = end
+    return count, at_floor, outcome
 
 
-def newton_iteration(model, start, terms, shift):
-    """Return the next positions, gradient, g, norm and reach, whether they are better, the shift.
+def newton_iteration(model, work, start, terms, shift):
+    """Fill in the end; return its g, norm and reach, whether it is better, and the shift.
 
     The search for a shift begins below the last, which so decays when no longer needed.
     """
-    x, gradient, value = start
-    data, values = hessian_data(model, x, terms), np.empty(model.factor.updates.entries)
-    unshifted = data[model.diagonal]
+    fill_hessian(model, work, start[0], terms)
+    for i in range(len(model.diagonal)):
+        work.unshifted[i] = work.data[model.diagonal[i]]
     shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
-    while True:
-        for i in range(len(unshifted)):
-            data[model.diagonal[i]] = unshifted[i] + shift * model.masses[i]
-        if factorized(model.factor, data, values):
-            break
+    while not is_factorised(model, work, shift):
         shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
-    step = descent(model.factor, values, gradient)
-    return *search_line(x, gradient, value, step, terms), shift
+    fill_descent(model.factor, work, start[1])
+    end, found = fill_end(start, work.step, terms, work.end, work.end_gradient, work.room)
+    return end, found, shift
+
+
+def is_factorised(model, work, shift):
+    """Factorise the Hessian plus a multiple of M; return whether the sum is positive definite."""
+    for i in range(len(model.diagonal)):
+        work.data[model.diagonal[i]] = work.unshifted[i] + shift * model.masses[i]
+    return eliminate_fronts(model.factor, work.data, work.values, work.scratch) < 0
 
 
 def iterate_once(memory, start, terms, shift):
-    """Return the same as `newton_iteration`, with the model in a block of memory."""
-    return newton_iteration(model_in(memory), start, terms, shift)
+    """Return positions, gradient and what `newton_iteration` returns."""
+    model = model_in(memory)
+    work = work_for(model, len(start[0]))
+    end, found, shift = newton_iteration(model, work, start, terms, shift)
+    return (work.end, work.end_gradient, *end), found, shift
 
 
-def hessian_data(model, x, terms):
-    """Return the data of the Hessian of g at x, sparse in the pattern of the model."""
-    h, _, _, springs, (rest_lengths, stiffnesses, tension_only), pinned = terms
-    system = model.system
-    effective = SystemArrays(
-        system.masses,
-        springs,
-        rest_lengths,
-        stiffnesses,
-        system.dampings,
-        tension_only,
-        pinned,
-        system.gravity,
-    )
-    K = stiffness_blocks(x, effective, True)
-    for s in range(len(K)):
-        for a in range(3):
-            for b in range(3):
-                K[s, a, b] *= h * h
-    data = sum_blocks(K, model.places, model.ends, model.starts)
+def fill_hessian(model, work, x, terms):
+    """Fill in the data of the Hessian of g at x."""
+    h, _, _, springs, elastic, _ = terms
+    fill_blocks(x, springs, elastic, h * h, True, work.blocks)
+    for e in range(len(work.data)):
+        work.data[e] = 0.0
+    add_blocks(work.blocks, model.places, model.ends, model.starts, work.data)
     for i in range(len(model.masses)):
-        data[model.diagonal[i]] += model.masses[i]
-    return data
+        work.data[model.diagonal[i]] += model.masses[i]
 
 
-def factorized(pattern, data, values):
-    """Fill the values of the factor of a matrix; return whether it is positive definite."""
-    graph, order, place, blocks, updates = pattern
-    return factorize(graph, order, place, blocks, updates, data, values) < 0
-
-
-def descent(factor, values, gradient):
-    """Return the solution of H s = -grad g, (particle, 3), from the factor's values."""
-    n, step = 3 * len(gradient), np.empty(gradient.shape)
-    b, unknowns = np.zeros((n, RIGHT_HAND_SIDES)), np.empty((n, REGISTER))
-    for i in range(n):
-        b[i, 0] = -gradient[i // 3, i % 3]
+def fill_descent(factor, work, gradient):
+    """Fill in the solution of H s = -grad g from the factor's values."""
+    for i in range(len(gradient)):
+        for c in range(3):
+            work.right[3 * i + c, 0] = -gradient[i, c]
     columns, starts, rows, _ = factor.blocks
-    solution = np.empty(b.shape)
-    solve(factor.order, columns, starts, rows, values, b, unknowns, solution)
-    for i in range(n):
-        step[i // 3, i % 3] = solution[i, 0]
-    return step
+    x = work.solution
+    solve(factor.order, columns, starts, rows, work.values, work.right, work.unknowns, x)
+    for i in range(len(gradient)):
+        for c in range(3):
+            work.step[i, c] = x[3 * i + c, 0]
 
 
-def is_saddle(model, x, terms):
+def is_saddle(model, work, x, terms):
     """Return whether the Hessian at x has a negative eigenvalue, beyond rounding."""
-    if not model.free.any():
-        return False
-    data = hessian_data(model, x, terms)
-    error = hessian_rounding(x, model.system.rest_lengths, terms, model.free, model.most_springs)
+    rest_lengths, room = model.system.rest_lengths, work.room[0]
+    error = hessian_error(x, rest_lengths, terms, model.free, model.most_springs, room)
+    fill_hessian(model, work, x, terms)
     for i in model.diagonal:
-        data[i] += error
-    return not factorized(model.factor, data, np.empty(model.factor.updates.entries))
+        work.data[i] += error
+    return eliminate_fronts(model.factor, work.data, work.values, work.scratch) >= 0
+
+
+def overwrite(x, other):
+    """Overwrite an array (particle, 3) with another."""
+    for i in range(len(x)):
+        store_vector(x, i, load_vector(other, i))
 
 
 _step = Kernel(newton_step, label="steps by Newton's method")

@@ -38,14 +38,11 @@ def inertial_positions(x_n, v_n, h, pinned, targets):
     return y
 
 
-def start_at(x_n, y, free):
-    """Return x_n with the pins where y has them."""
-    x = y.copy()
+def move_free(x, x_n, free):
+    """Move the free particles of x to x_n."""
     for i in range(len(x)):
         if free[i]:
-            for c in range(3):
-                x[i, c] = x_n[i, c]
-    return x
+            store_vector(x, i, load_vector(x_n, i))
 
 
 def step_end(x_n, x, h, history):
@@ -68,14 +65,15 @@ def is_finite(value, gradient_norm, floor_bound):
     return math.isfinite(value + gradient_norm + terms * terms)
 
 
-def standing(x, norm, bound, terms, first):
+def standing(x, norm, bound, terms, first, room):
     """Return the residual at x, whether the gradient is at the floor, and whether at rest.
 
-    `norm` is the gradient's, `bound` that of the floor, and `first` the norm at y.
+    `norm` is the gradient's, `bound` that of the floor, `first` the norm at y; `room` is that of
+    `rounding_sums`.
     """
     at_floor, at_rest, scale = False, False, first
     if norm <= bound or first < bound:
-        floor = rounding_bounds(x, *terms)[0]
+        floor, _ = rounding_sums(x, terms, *room)
         at_floor, at_rest = norm <= floor, norm <= EPS / SUM_ROUNDING * floor
         scale = max(first, floor)
     return 0.0 if norm == 0.0 else norm / scale, at_floor, at_rest
@@ -101,14 +99,21 @@ def blend_dampers(x_n, h, stiffnesses, system):
 
 def evaluate_objective(x, h, constant, particles, springs, elastic, pinned):
     """Return grad g, g, |grad g| and the largest distance of a particle from the origin."""
-    gradient, hh = np.empty(x.shape), h * h
-    rest_lengths, stiffnesses, tension_only = elastic
+    gradient = np.empty(x.shape)
+    terms = h, constant, particles, springs, elastic, pinned
+    return gradient, *fill_gradient(x, terms, gradient)
+
+
+def fill_gradient(x, terms, gradient):
+    """Fill an array with grad g, and return the rest of `evaluate_objective`."""
+    h, constant, particles, springs, (rest_lengths, stiffnesses, tension_only), pinned = terms
+    hh = h * h
     value, largest = add_particles(x, particles, hh, 0, len(x), gradient)
     value += hh * constant
     for s in range(len(springs)):
         i, j, k = at(springs[s, 0]), at(springs[s, 1]), hh * stiffnesses[s]
         value += add_spring(x, i, j, k, rest_lengths[s], tension_only[s], gradient)
-    return gradient, value, zero_pins(pinned, gradient), math.sqrt(largest)
+    return value, zero_pins(pinned, gradient), math.sqrt(largest)
 
 
 def evaluate_regions(x, h, particles, elastic, regions, first, last, gradient, sums):
@@ -188,8 +193,15 @@ def zero_pins(pinned, gradient):
 
 def rounding_bounds(x, h, constant, particles, springs, elastic, pinned):
     """Return upper bounds of the rounding errors of |grad g| and of g."""
-    (y, external, masses), (rest_lengths, stiffnesses, tension_only) = particles, elastic
-    size, reach, value_size, squares = np.empty(len(x)), np.empty(len(x)), 0.0, 0.0
+    terms = h, constant, particles, springs, elastic, pinned
+    return rounding_sums(x, terms, np.empty(len(x)), np.empty(len(x)))
+
+
+def rounding_sums(x, terms, size, reach):
+    """Do the same as `rounding_bounds` with room for two numbers of each particle."""
+    h, _, (y, external, masses), springs, elastic, pinned = terms
+    rest_lengths, stiffnesses, tension_only = elastic
+    value_size, squares = 0.0, 0.0
     for i in range(len(x)):
         x_i, y_i, pull = (
             load_vector(x, i),
@@ -220,8 +232,15 @@ def hessian_rounding(x, rest_lengths, terms, free, most_springs):
 
     The error includes that of the effective rest lengths, relative to these and the given ones.
     """
+    return hessian_error(x, rest_lengths, terms, free, most_springs, np.empty(len(x)))
+
+
+def hessian_error(x, rest_lengths, terms, free, most_springs, sizes):
+    """Do the same as `hessian_rounding` with room for a number of each particle."""
     h, _, (_, _, masses), springs, (effective, stiffnesses, tension_only), _ = terms
-    sizes, largest = masses.copy(), 0.0
+    largest = 0.0
+    for i in range(len(sizes)):
+        sizes[i] = masses[i]
     for s in range(len(springs)):
         i, j, k = springs[s, 0], springs[s, 1], h * h * stiffnesses[s]
         length, _ = spring_frame(x, i, j)

@@ -112,6 +112,12 @@ def find(rows, first, last, row):
 def sum_blocks(blocks, places, ends, starts):
     """Return the data of the sum of (A_i A_i') x B_i in the widened pattern."""
     data = np.zeros(9 * starts[-1])
+    add_blocks(blocks, places, ends, starts, data)
+    return data
+
+
+def add_blocks(blocks, places, ends, starts, data):
+    """Add the sum of (A_i A_i') x B_i to data in the widened pattern."""
     for s in range(len(places)):
         for b in range(4):
             place = places[s, b]
@@ -121,7 +127,6 @@ def sum_blocks(blocks, places, ends, starts):
                 for c in range(3):
                     for r in range(3):
                         data[at(first + 3 * (end - begin) * c + r)] += sign * blocks[s, c, r]
-    return data
 
 
 def sum_weights(weights, diagonal, places, starts, rows):

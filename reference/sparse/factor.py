@@ -37,7 +37,7 @@ class CholeskyFactor:
             pattern = analyse(graph)
         self.pattern = pattern
         self._values = np.empty(pattern.updates.entries)
-        failed = _factorize(*pattern, np.array(columns.data, dtype=np.float64), self._values)
+        failed = _factorize(pattern, np.array(columns.data, dtype=np.float64), self._values)
         if failed >= 0:
             raise NotPositiveDefiniteError(
                 f"matrix: expected positive definite, got no positive pivot in row"

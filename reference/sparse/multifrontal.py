@@ -11,22 +11,49 @@ rows. Indices are made unsigned (`at`) for the reason given in `triangular`.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.compiled import relaxed
+from ..backend.compiled import relaxed, uncounted
 
 PANEL = 64  # rows eliminated one by one before the rest is updated
 STRIP = 256  # columns updated together, so that those of a panel stay in a near cache
 
 
-@relaxed
-def factorize(graph, order, place, blocks, updates, data, values):
+class Scratch(NamedTuple):
+    """What a factorisation writes to."""
+
+    front: np.ndarray  # the square of the tallest front
+    stack: np.ndarray  # of updates
+    local: np.ndarray  # the place of each row in the front
+    places: np.ndarray  # in the front, of the rows of an update
+
+
+def scratch_for(blocks, updates, n):
+    """Return the scratch to factorise a matrix of n rows."""
+    return Scratch(
+        np.empty(blocks.tallest * blocks.tallest),
+        np.empty(updates.highest),
+        np.empty(n, np.int32),
+        np.empty(blocks.tallest, np.int32),
+    )
+
+
+def factorize(pattern, data, values):
     """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
-    work, stack = np.empty(blocks.tallest * blocks.tallest), np.empty(updates.highest)
+    scratch = scratch_for(pattern.blocks, pattern.updates, len(pattern.order))
+    return eliminate_fronts(pattern, data, values, scratch)
+
+
+@relaxed
+@uncounted
+def eliminate_fronts(pattern, data, values, scratch):
+    """Do the same as `factorize` with scratch made before."""
+    graph, order, place, blocks, updates = pattern
+    work, stack, local, places = scratch
     columns, starts, rows = blocks.columns, blocks.starts, blocks.rows
-    local, places = np.empty(len(order), np.int32), np.empty(blocks.tallest, np.int32)
     top, filled = 0, 0
     for s in range(len(columns) - 1):
         first, last = columns[s], columns[s + 1]
