@@ -5,10 +5,12 @@ Euler. `mass_spring.damper_forces` compares the two laws. A pin moves in a strai
 velocity to its position at the end of the steps. Its velocity in the state is ignored.
 """
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .arguments import LARGEST_COORDINATE, integer, number
+from .arguments import LARGEST_COORDINATE, FloatArray, integer, number
 from .backend.compiled import Kernel
 from .mass_spring import (
     MassSpring,
@@ -20,6 +22,8 @@ from .mass_spring import (
 )
 from .quaternion import add, load_vector, scale, store_vector
 
+# With more steps the start of an implicit step would take as long as the step.
+MOST_STEPS = 1000
 # Of each stage of a Runge-Kutta step: how far the next stage lies along its rates, in steps, and
 # how much the rates count.
 STAGES = ((0.5, 1.0 / 6.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 3.0), (0.0, 1.0 / 6.0))
@@ -60,6 +64,44 @@ def runge_kutta(
     Arguments and errors are as for `symplectic_euler`.
     """
     return _advanced("runge_kutta", system, state, h, external_forces, pin_positions, steps)
+
+
+def explicit_positions(
+    system: MassSpring,
+    state: State,
+    h: float,
+    external_forces: ArrayLike | None,
+    pin_positions: ArrayLike | None,
+) -> FloatArray | None:
+    """Return the positions a time h [s] later, near the end of the step of implicit Euler.
+
+    They come from stable steps of symplectic Euler; None if these are more than MOST_STEPS, or
+    overflow.
+    """
+    steps = stable_steps(system, h)
+    if steps > MOST_STEPS:
+        return None
+    arguments = h / steps, external_forces, pin_positions
+    try:
+        return symplectic_euler(system, state, *arguments, steps=int(steps)).positions
+    except FloatingPointError:
+        return None
+
+
+def stable_steps(system: MassSpring, h: float) -> float:
+    """Return how many steps of symplectic Euler through h [s] are stable.
+
+    Without rest lengths and dampers a step is stable for a frequency w if its length times w is at
+    most 2, with a damping rate d if (w h)² + 2 d h <= 4. Both are at most the Gershgorin bounds of
+    M^-1 times the graph Laplacians of k and of c.
+    """
+    ends, free = system.springs.ravel(), system.free
+    rates = []
+    for values in (system.stiffnesses, system.dampings):
+        sums = np.bincount(ends, np.repeat(values, 2), system.particle_count)
+        rates.append(float((2.0 * sums[free] / system.masses[free]).max(initial=0.0)))
+    square, damping = rates[0] * h * h, rates[1] * h
+    return max(1.0, math.ceil((damping + math.sqrt(damping**2 + 4.0 * square)) / 4.0))
 
 
 def _advanced(

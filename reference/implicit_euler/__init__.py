@@ -23,7 +23,7 @@ from .lbfgs import LBFGS
 from .local_global import Chebyshev, LocalGlobal
 from .newton import Newton
 from .newton_cg import NewtonCG
-from .objective import STARTS, Iterate, Objective
+from .objective import STARTS, Iterate, Objective, begin_at
 from .stopping import DIVERGED, GO_ON, outcome_at
 from .terms import step_end
 
@@ -54,7 +54,8 @@ STEP_SOLVERS: dict[str, type[StepMethod]] = {
 }
 
 OUTCOMES = tuple(Outcome)
-NO_PINS = np.empty((0, 3))
+# No positions of pins, no positions to begin at; read-only, as those of states are.
+NOWHERE = frozen(np.empty((0, 3)))
 # Positions and velocities at the end of a step, (2, particle, 3); residuals and values of g before
 # and after each iteration, (2, iterations + 1), none on overflow; whether the gradient is at the
 # floor; the outcome.
@@ -96,8 +97,10 @@ class ImplicitEuler:
         solver: a name in `STEP_SOLVERS`.
         tolerance: residual to stop at; 0 runs all iterations.
         max_iterations: most iterations in a step; None means the solver's default.
-        start: first iterate, "y" or "x_n"; None means y for all but gauss_newton, which starts at
-            x_n by definition. Residuals are relative to y in both cases.
+        start: first iterate, "y", "x_n", or "explicit", the positions after h by stable steps of
+            symplectic Euler, which save iterations on stiff systems (y if they are more than
+            1,000). None means y for all but gauss_newton, which starts at x_n by definition.
+            Residuals are relative to y in all cases.
     """
 
     system: MassSpring
@@ -121,7 +124,7 @@ class ImplicitEuler:
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
         object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, minimum=0))
-        starts = STARTS[1:] if self.solver == "gauss_newton" else STARTS
+        starts = ("x_n",) if self.solver == "gauss_newton" else STARTS
         start = starts[0] if self.start is None else choice("start", self.start, starts)
         object.__setattr__(self, "start", start)
         object.__setattr__(self, "_solver", method(self.system, self.h))
@@ -205,12 +208,15 @@ class ImplicitEuler:
         external = system.weights
         if external_forces is not None:
             external = constant_forces(system, external_forces)
-        targets = NO_PINS if pin_positions is None else pin_targets(system, pin_positions)
-        stop = self.tolerance, self._iteration_limit
-        start = self.start == "x_n"
-        return solver.step(
-            state.positions, state.velocities, external, targets, self.h, stop, start
-        )
+        targets = NOWHERE
+        if pin_positions is not None:
+            targets = frozen(pin_targets(system, pin_positions))
+        begin, stop = None, (self.tolerance, self._iteration_limit)
+        if self.start != "y":
+            start = self.start or STARTS[0]
+            begin = begin_at(start, system, state, self.h, external_forces, pin_positions)
+        motion = state.positions, state.velocities, external, targets
+        return solver.step(*motion, NOWHERE if begin is None else begin, self.h, stop)
 
     def _minimised(self, objective: Objective) -> StepEnd:
         """Return the end of a step by the solver's iterates."""

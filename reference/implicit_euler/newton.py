@@ -145,11 +145,12 @@ def pairs(values, count):
     return values.reshape((len(values) // count, count))
 
 
-def newton_step(memory, x_n, v_n, external, targets, h, stop, from_x_n):
-    """Make a step of implicit Euler by Newton's method, from y or from x_n.
+def newton_step(memory, x_n, v_n, external, targets, begin, h, stop):
+    """Make a step of implicit Euler by Newton's method.
 
-    `targets` are the positions of the pins at the end of the step, none if they stay; `stop` is the
-    tolerance and the limit of iterations.
+    `targets` are the positions of the pins at the end of the step, none if they stay; `begin` is
+    where the free particles begin, empty for y; `stop` is the tolerance and the limit of
+    iterations.
 
     Returns:
         positions and velocities, (2, particle, 3); the residual and g before and after each
@@ -166,7 +167,7 @@ def newton_step(memory, x_n, v_n, external, targets, h, stop, from_x_n):
     sums = sum_springs(system.masses, system.springs, rest_lengths, model.stiffnesses)
     floor = rounding_coefficients(y, external, h, system.masses, sums, model.free)
     work, history, x = work_for(model, len(y)), np.empty((2, stop[1] + 1)), y.copy()
-    start = x_n, x, from_x_n
+    start = begin, x
     count, at_floor, outcome = minimise(model, work, start, terms, floor, history, stop)
     return *step_end(x_n, x, h, history[:, : count + 1].copy()), at_floor, outcome
 
@@ -212,15 +213,15 @@ def work_for(model, n):
 def minimise(model, work, start, terms, floor, history, stop):
     """Iterate until `outcome_at` says so; return the number of iterations, at_floor, the outcome.
 
-    `start` is of x_n, of x, which is y and becomes the end, and of whether to start at x_n. `floor`
-    is of the coefficients of the floor. The number of iterations is -1 if the start overflows.
+    `start` is of the positions to begin at, and of x, which is y and becomes the end. `floor` is of
+    the coefficients of the floor. The number of iterations is -1 if the start overflows.
     """
-    (x_n, x, from_x_n), gradient = start, work.gradient
+    (begin, x), gradient = start, work.gradient
     value, norm, reach = fill_gradient(x, terms, gradient)
     first, count, best, at_floor, outcome = norm, -1, 0, False, GO_ON
     shift, found, convex = 0.0, True, False
-    if from_x_n and is_finite(value, norm, floor[0] + floor[1] * reach):
-        move_free(x, x_n, model.free)
+    if len(begin) > 0 and is_finite(value, norm, floor[0] + floor[1] * reach):
+        move_free(x, begin, model.free)
         value, norm, reach = fill_gradient(x, terms, gradient)
     while outcome == GO_ON:
         bound = floor[0] + floor[1] * reach

@@ -26,6 +26,7 @@ from ..arguments import FloatArray, boolean, choice, coordinates, instance, numb
 from ..backend.compiled import Kernel
 from ..backend.partition import Regions
 from ..backend.threads import in_slices
+from ..explicit import explicit_positions
 from .terms import (
     EPS,
     SUM_ROUNDING,
@@ -38,7 +39,7 @@ from .terms import (
     rounding_coefficients,
 )
 
-STARTS = ("y", "x_n")
+STARTS = ("y", "x_n", "explicit")
 
 
 @dataclass(eq=False)
@@ -132,7 +133,7 @@ class Objective:
         pin_positions: ArrayLike | None = None,
         start: str = "y",
     ) -> None:
-        """Set up the step of length h from a state; `start` is the first iterate, "y" or "x_n".
+        """Set up the step of length h from a state; `start` is in `STARTS`, see `ImplicitEuler`.
 
         Raise a ValueError if h is not positive, the state has another number of particles, or an
         array has another shape or is not finite. External forces [N] have shape (particle, 3), the
@@ -156,15 +157,15 @@ class Objective:
         self._floor_coefficients = _rounding_coefficients(
             self.y, self.external, h, arrays.masses, self.effective.spring_sums, system.free
         )
-        self._start = choice("start", start, STARTS)
+        self._begin = begin_at(start, system, state, h, external_forces, pin_positions)
         self.inertial = self.iterate_at(self.y)
 
     @functools.cached_property
     def start(self) -> Iterate:
-        """The first iterate: y, or x_n with the pins where y has them."""
-        if self._start == "y":
+        """The first iterate, with the pins where y has them."""
+        if self._begin is None:
             return self.inertial
-        return self.iterate_at(np.where(self.system.free[:, None], self.x_n, self.y))
+        return self.iterate_at(np.where(self.system.free[:, None], self._begin, self.y))
 
     def evaluate(self, positions: ArrayLike) -> Iterate:
         """Return g and its gradient at positions of shape (particle, 3) [m]."""
@@ -243,6 +244,20 @@ class Objective:
 
     def _positions(self, positions: ArrayLike) -> FloatArray:
         return coordinates("positions", positions, self.system.particle_count, 3)
+
+
+def begin_at(
+    start: str,
+    system: mass_spring.MassSpring,
+    state: mass_spring.State,
+    h: float,
+    external_forces: ArrayLike | None,
+    pin_positions: ArrayLike | None,
+) -> FloatArray | None:
+    """Return where the free particles begin, (particle, 3), or None for y."""
+    if choice("start", start, STARTS) == "explicit":
+        return explicit_positions(system, state, h, external_forces, pin_positions)
+    return state.positions if start == "x_n" else None
 
 
 def global_matrix(system: mass_spring.MassSpring, h: float) -> Any:

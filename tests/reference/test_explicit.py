@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from plumbob.reference import explicit
 from plumbob.reference.backend import compiled
 from plumbob.reference.explicit import runge_kutta, symplectic_euler
 from plumbob.reference.mass_spring import (
     MassSpring,
     State,
     forces,
+    incidence,
     kinetic_energy,
     potential_energy,
 )
@@ -141,6 +143,28 @@ class TestEveryIntegrator:
             run(integrator, system, state, 1.0, 200)
         with pytest.raises(FloatingPointError, match=message):
             integrator(system, state, 1.0, steps=200)
+
+
+@pytest.mark.parametrize("damping", [0.0, 1.0, 30.0])
+def test_as_many_steps_as_said_are_stable_and_few_are_not(network, damping):
+    """Springs of no rest length are linear: the step's matrix has no eigenvalue beyond 1."""
+    system = network[0].replaced(
+        rest_lengths=np.zeros(len(network[0].springs)),
+        dampings=np.full(len(network[0].springs), damping),
+        stiffnesses=500.0 * np.ones(len(network[0].springs)),
+    )
+    free, A = system.free, incidence(system).toarray()
+    L = A @ A.T / system.masses[:, None]
+    L = L[np.ix_(free, free)]
+
+    def largest(steps):
+        h, one = 1.0 / steps, np.eye(len(L))
+        v = np.hstack([-h * 500.0 * L, one - h * damping * L])
+        return abs(np.linalg.eigvals(np.vstack([np.hstack([one, 0 * one]) + h * v, v]))).max()
+
+    steps = explicit.stable_steps(system, 1.0)
+    assert largest(steps) <= 1.0 + 1e-9
+    assert largest(steps / 2.5) > 1.0
 
 
 def test_symplectic_euler_keeps_the_energy_over_ten_thousand_steps():

@@ -7,7 +7,7 @@ import pytest
 
 from plumbob.reference import scenes
 from plumbob.reference.backend import compiled
-from plumbob.reference.implicit_euler import STEP_SOLVERS, ImplicitEuler
+from plumbob.reference.implicit_euler import STARTS, STEP_SOLVERS, ImplicitEuler
 from plumbob.reference.mass_spring import (
     MassSpring,
     State,
@@ -146,16 +146,37 @@ class TestStep:
         np.testing.assert_allclose(from_y.positions, expected, rtol=0, atol=1e-14)
 
     @pytest.mark.parametrize("name", CONVERGING)
-    def test_from_x_n_every_solver_comes_to_the_same_minimiser(self, cloth, name):
+    def test_from_every_start_a_solver_comes_to_the_same_minimiser(self, cloth, name):
         pins = cloth[1].positions[cloth[0].pinned] + [0.0, 0.02, 0.01]
-        integrators = [ImplicitEuler(cloth[0], h=h, solver=name, start=at) for at in ("y", "x_n")]
+        integrators = [ImplicitEuler(cloth[0], h=h, solver=name, start=at) for at in STARTS]
         results = [integrator.step(cloth[1], pin_positions=pins) for integrator in integrators]
         starts = [next(one.iterates(cloth[1], pin_positions=pins)) for one in integrators]
-        assert np.abs(starts[0].positions - starts[1].positions).max() > 0.01
-        np.testing.assert_array_equal(starts[1].positions[cloth[0].pinned], pins)
-        assert all(result.outcome == Outcome.CONVERGED for result in results)
-        ends = [result.state.positions for result in results]
-        np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)  # both residuals are below 1e-10
+        for one, other in itertools.combinations(starts, 2):
+            assert np.abs(one.positions - other.positions).max() > 0.001
+        for result, start in zip(results, starts, strict=True):
+            np.testing.assert_array_equal(start.positions[cloth[0].pinned], pins)
+            assert result.outcome == Outcome.CONVERGED
+            assert result.objectives[0] == start.value
+            # Both residuals are below 1e-10.
+            ends = result.state.positions, results[0].state.positions
+            np.testing.assert_allclose(*ends, rtol=0, atol=1e-9)
+
+    def test_an_explicit_start_saves_iterations_on_a_stiff_frame(self):
+        system, state = scenes.lab_cloth(size=12, stiffness=1e4)
+        counts = [
+            ImplicitEuler(system, h=1 / 30, start=start).step(state).iterations
+            for start in ("explicit", "y")
+        ]
+        assert counts[0] < counts[1]
+
+    @pytest.mark.parametrize(("stiffness", "speed"), [(1e12, 0.0), (1.0, 1e75)])
+    def test_without_an_explicit_start_the_step_starts_at_y(self, stiffness, speed):
+        """It would take too many steps, or overflow."""
+        system, state = scenes.hanging_rope(particles=4, stiffness=stiffness)
+        fast = State(state.positions, np.where(system.free[:, None], speed, 0.0) + np.zeros((4, 3)))
+        ends = [stepped(system, fast, start=start, max_iterations=9) for start in ("explicit", "y")]
+        np.testing.assert_array_equal(ends[0].history, ends[1].history)
+        assert ends[0].outcome == ends[1].outcome
 
     def test_gauss_newton_starts_only_at_x_n(self, cloth):
         assert ImplicitEuler(cloth[0], solver="gauss_newton").start == "x_n"
@@ -380,8 +401,8 @@ class TestInputs:
             ("solver", "simplex", f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'"),
             ("tolerance", -1e-3, "at least 0"),
             ("max_iterations", -1, "at least 0"),
-            ("start", "z", "one of y, x_n, got 'z'"),
-            ("start", 1, "one of y, x_n, got 1"),
+            ("start", "z", "one of y, x_n, explicit, got 'z'"),
+            ("start", 1, "one of y, x_n, explicit, got 1"),
         ],
     )
     def test_wrong_settings_are_named(self, cloth, name, value, message):
