@@ -12,7 +12,17 @@ from numpy.typing import ArrayLike
 
 from .arguments import LARGEST_COORDINATE, FloatArray, integer, number
 from .backend.compiled import Kernel
+from .backend.simd.vectors import (
+    LANES,
+    all_within,
+    gather_vectors,
+    larger,
+    load_entries,
+    scatter_vectors,
+    square_root,
+)
 from .mass_spring import (
+    COINCIDENT,
     MassSpring,
     State,
     add_pulls,
@@ -20,7 +30,7 @@ from .mass_spring import (
     constant_forces,
     pin_targets,
 )
-from .quaternion import add, load_vector, scale, store_vector
+from .quaternion import add, dot, load_vector, scale, store_vector, subtract
 
 # With more steps the start of an implicit step would take as long as the step.
 MOST_STEPS = 1000
@@ -132,37 +142,81 @@ def _advanced(
 
 def symplectic_euler_steps(x, v, h, steps, constant, system):
     """Make steps of symplectic Euler in place, pins at their velocities; return `are_bounded`."""
-    total, mobility = np.empty(x.shape), mobilities(system)
+    X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
+    springs = springs_in_lanes(system)
     for _ in range(steps):
-        total[:] = constant
-        add_pulls(x, v, system, total)
+        overwrite(total, constant)
+        add_pulls_in_lanes(X, V, system, springs, total)
         for i in range(len(x)):
-            v_i = add(load_vector(v, i), scale(h * mobility[i], load_vector(total, i)))
-            store_vector(v, i, v_i)
-            store_vector(x, i, add(load_vector(x, i), scale(h, v_i)))
+            v_i = add(load_vector(V, i), scale(h * mobility[i], load_vector(total, i)))
+            store_vector(V, i, v_i)
+            store_vector(X, i, add(load_vector(X, i), scale(h, v_i)))
+    overwrite(x, X)
+    overwrite(v, V)
     return are_bounded(x, v)
 
 
 def runge_kutta_steps(x, v, h, steps, constant, system):
     """Make steps of the Runge-Kutta method in place, as `symplectic_euler_steps` does."""
-    total, mobility = np.empty(x.shape), mobilities(system)
-    x_n, v_n = x.copy(), v.copy()
-    stage_x, stage_v = x.copy(), v.copy()
+    X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
+    springs = springs_in_lanes(system)
     for _ in range(steps):
+        stage_x, stage_v = rows_of(x), rows_of(v)
         for shift, weight in STAGES:
-            total[:] = constant
-            add_pulls(stage_x, stage_v, system, total)
+            overwrite(total, constant)
+            add_pulls_in_lanes(stage_x, stage_v, system, springs, total)
             for i in range(len(x)):
                 dx, dv = load_vector(stage_v, i), scale(mobility[i], load_vector(total, i))
-                store_vector(x, i, add(load_vector(x, i), scale(weight * h, dx)))
-                store_vector(v, i, add(load_vector(v, i), scale(weight * h, dv)))
-                store_vector(stage_x, i, add(load_vector(x_n, i), scale(shift * h, dx)))
-                store_vector(stage_v, i, add(load_vector(v_n, i), scale(shift * h, dv)))
-        x_n[:] = x
-        v_n[:] = v
-        stage_x[:] = x
-        stage_v[:] = v
+                store_vector(X, i, add(load_vector(X, i), scale(weight * h, dx)))
+                store_vector(V, i, add(load_vector(V, i), scale(weight * h, dv)))
+                store_vector(stage_x, i, add(load_vector(x, i), scale(shift * h, dx)))
+                store_vector(stage_v, i, add(load_vector(v, i), scale(shift * h, dv)))
+        overwrite(x, X)
+        overwrite(v, V)
     return are_bounded(x, v)
+
+
+def add_pulls_in_lanes(x, v, system, springs, total):
+    """Do the same as `add_pulls` for rows, eight springs at once, in half of the time."""
+    (floors, slack, damped), count = springs, len(system.springs) // LANES * LANES
+    ends = system.springs
+    for s in range(0, count, LANES):
+        p = subtract(gather_vectors(x, ends, s, 0), gather_vectors(x, ends, s, 1))
+        length = square_root(dot(p, p))
+        inverse = 1.0 / length
+        if not all_within(inverse, 1.0 / COINCIDENT):
+            add_pulls(x, v, system, s, s + LANES, total)
+            continue
+        stretch = length - load_entries(system.rest_lengths, s)
+        if slack:
+            stretch = larger(stretch, load_entries(floors, s))
+        tension = load_entries(system.stiffnesses, s) * stretch
+        if damped:
+            w = subtract(gather_vectors(v, ends, s, 0), gather_vectors(v, ends, s, 1))
+            tension = tension + load_entries(system.dampings, s) * (dot(w, p) * inverse)
+        pull = scale(tension * inverse, p)
+        scatter_vectors(total, ends, s, 0, scale(-1.0, pull))
+        scatter_vectors(total, ends, s, 1, pull)
+    add_pulls(x, v, system, count, len(ends), total)
+
+
+def springs_in_lanes(system):
+    """Return the least stretch of each spring, whether any may be slack, whether any is damped."""
+    ropes = system.tension_only
+    return np.where(ropes, 0.0, -np.inf), ropes.any(), system.dampings.any()
+
+
+def rows_of(vectors):
+    """Return vectors as rows of four numbers, the last of them zero."""
+    rows = np.zeros((len(vectors), 4))
+    overwrite(rows, vectors)
+    return rows
+
+
+def overwrite(vectors, others):
+    """Copy vectors, (particle, 3), or rows of four."""
+    for i in range(len(vectors)):
+        store_vector(vectors, i, load_vector(others, i))
 
 
 def are_bounded(x, v):

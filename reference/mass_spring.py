@@ -384,13 +384,13 @@ def pin_targets(system: MassSpring, pin_positions: ArrayLike) -> FloatArray:
 def spring_pulls(x, v, system):
     """Return the forces of springs and dampers on each particle, shape (particle, 3)."""
     total = np.zeros(x.shape)
-    add_pulls(x, v, system, total)
+    add_pulls(x, v, system, 0, len(system.springs), total)
     return total
 
 
-def add_pulls(x, v, system, total):
-    """Add the forces of springs and dampers on each particle."""
-    for s in range(len(system.springs)):
+def add_pulls(x, v, system, first, last, total):
+    """Add the forces of springs `first` to `last` - 1 and their dampers."""
+    for s in range(first, last):
         i, j = at(system.springs[s, 0]), at(system.springs[s, 1])
         length, p, inverse = spring_line(x, i, j)
         stretch = spring_stretch(length, system.rest_lengths[s], system.tension_only[s])

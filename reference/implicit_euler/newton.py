@@ -14,8 +14,8 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..backend.memory import packed, part
+from ..explicit import overwrite
 from ..mass_spring import MassSpring, SystemArrays, fill_blocks, sum_springs
-from ..quaternion import load_vector, store_vector
 from ..sparse.assembly import add_blocks
 from ..sparse.dissection import Graph
 from ..sparse.multifrontal import Scratch, eliminate_fronts, scratch_for
@@ -312,12 +312,6 @@ def is_saddle(model, work, x, terms):
     for i in model.diagonal:
         work.data[i] += error
     return eliminate_fronts(model.factor, work.data, work.values, work.scratch) >= 0
-
-
-def overwrite(x, other):
-    """Overwrite an array (particle, 3) with another."""
-    for i in range(len(x)):
-        store_vector(x, i, load_vector(other, i))
 
 
 _step = Kernel(newton_step, label="steps by Newton's method")

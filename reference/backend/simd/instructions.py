@@ -29,7 +29,12 @@ MASK = ir.IntType(LANES)
 ROW = ir.VectorType(DOUBLE, 4)
 DOUBLE_BYTES, LINE_BYTES = 8, 64
 FUSED = ("contract",)
-INSTRUCTIONS = {operator.add: "fadd", operator.sub: "fsub", operator.mul: "fmul"}
+INSTRUCTIONS = {
+    operator.add: "fadd",
+    operator.sub: "fsub",
+    operator.mul: "fmul",
+    operator.truediv: "fdiv",
+}
 # The arguments of llvm.prefetch: read or write, keep in the nearest cache, data.
 READ, WRITE, NEAR, DATA = 0, 1, 3, 1
 
@@ -64,7 +69,7 @@ def repeat(context, builder, kind, target, value):
 
 
 def define_arithmetic(operation, instruction):
-    """Let lanes be added, subtracted or multiplied, by lanes or floats."""
+    """Let lanes be added, subtracted, multiplied or divided, by lanes or floats."""
 
     @type_callable(operation)
     def operands(context):
@@ -120,6 +125,69 @@ def store_lanes(typingctx, scratch, j, value):
         return context.get_dummy_value()
 
     return types.none(_contiguous(scratch), types.intp, types.UniTuple(lanes, 4)), generate
+
+
+@intrinsic
+def load_entries(typingctx, values, s):
+    """Read lanes."""
+
+    def generate(context, builder, signature, arguments):
+        entry = _pointer(context, builder, signature, *arguments)
+        return builder.load(builder.bitcast(entry, VECTOR.as_pointer()), align=DOUBLE_BYTES)
+
+    return lanes(values, types.intp), generate
+
+
+@intrinsic
+def gather_vectors(typingctx, x, ends, s, end):
+    """Read eight rows and transpose them."""
+
+    def generate(context, builder, signature, arguments):
+        pointers = _rows_of_springs(context, builder, signature, arguments)
+        rows = [builder.load(pointer, align=DOUBLE_BYTES) for pointer in pointers]
+        parts = _in_lanes(builder, rows)
+        return context.make_tuple(builder, signature.return_type, parts[:3])
+
+    return types.UniTuple(lanes, 3)(_contiguous(x, 2), ends, types.intp, types.intp), generate
+
+
+@intrinsic
+def scatter_vectors(typingctx, x, ends, s, end, value):
+    """Transpose lanes and add a row at a time: springs may share an end."""
+
+    def generate(context, builder, signature, arguments):
+        pointers = _rows_of_springs(context, builder, signature, arguments)
+        zero = ir.Constant(VECTOR, [0.0] * LANES)
+        rows = _in_rows(builder, [*cgutils.unpack_tuple(builder, arguments[4]), zero], HALF)
+        for pointer, row in zip(pointers, rows, strict=True):
+            total = builder.fadd(builder.load(pointer, align=DOUBLE_BYTES), row)
+            builder.store(total, pointer, align=DOUBLE_BYTES)
+        return context.get_dummy_value()
+
+    vectors = types.UniTuple(lanes, 3)
+    return types.none(_contiguous(x, 2), ends, types.intp, types.intp, vectors), generate
+
+
+@intrinsic
+def square_root(typingctx, value):
+    """Take all roots."""
+
+    def generate(context, builder, signature, arguments):
+        kind = ir.FunctionType(VECTOR, [VECTOR])
+        root = cgutils.get_or_insert_function(builder.module, kind, f"llvm.sqrt.v{LANES}f64")
+        return builder.call(root, arguments)
+
+    return lanes(lanes), generate
+
+
+@intrinsic
+def larger(typingctx, value, other):
+    """Compare and select."""
+
+    def generate(context, builder, signature, arguments):
+        return builder.select(builder.fcmp_ordered(">=", *arguments), *arguments)
+
+    return lanes(lanes, lanes), generate
 
 
 @intrinsic
@@ -214,9 +282,9 @@ def _reader(count):
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, READ)
         rows = [builder.load(pointer, align=DOUBLE_BYTES) for pointer in pointers]
-        rows = [_shuffled(builder, row, row, (0, 1, 2, count - 1)) for row in rows]
-        pairs = zip(rows[:HALF], rows[HALF:], strict=True)
-        parts = _transposed(builder, [_shuffled(builder, *pair, range(LANES)) for pair in pairs])
+        parts = _in_lanes(
+            builder, [_shuffled(builder, row, row, (0, 1, 2, count - 1)) for row in rows]
+        )
         return context.make_tuple(builder, signature.return_type, parts[:count])
 
     def read(typingctx, tile, j):
@@ -231,10 +299,8 @@ def _writer(count):
     def generate(context, builder, signature, arguments):
         pointers = _tile_row(context, builder, signature, arguments, count, WRITE)
         parts = cgutils.unpack_tuple(builder, arguments[2])
-        pairs = _transposed(builder, [*parts, parts[-1]][:4])
-        for lane, pointer in enumerate(pointers):
-            pair, begin = pairs[lane % HALF], lane // HALF * HALF
-            row = _shuffled(builder, pair, pair, range(begin, begin + count))
+        rows = _in_rows(builder, [*parts, parts[-1]][:4], count)
+        for row, pointer in zip(rows, pointers, strict=True):
             builder.store(row, pointer, align=DOUBLE_BYTES)
         return context.get_dummy_value()
 
@@ -242,6 +308,19 @@ def _writer(count):
         return types.none(_contiguous(tile), types.intp, types.UniTuple(lanes, count)), generate
 
     return intrinsic(write)
+
+
+def _in_lanes(builder, rows):
+    """Return the four lanes of eight rows."""
+    pairs = zip(rows[:HALF], rows[HALF:], strict=True)
+    return _transposed(builder, [_shuffled(builder, *pair, range(LANES)) for pair in pairs])
+
+
+def _in_rows(builder, parts, count):
+    """Return the eight rows of four lanes, each cut to a number of entries."""
+    pairs = _transposed(builder, parts)
+    begins = [(pairs[lane % HALF], lane // HALF * HALF) for lane in range(LANES)]
+    return [_shuffled(builder, pair, pair, range(b, b + count)) for pair, b in begins]
 
 
 def _transposed(builder, rows):
@@ -320,6 +399,19 @@ def _shuffled(builder, a, b, indices):
     """Return a vector of the entries of two others, taken end to end, at these indices."""
     mask = ir.Constant(ir.VectorType(INT, len(indices)), [INT(i) for i in indices])
     return builder.shuffle_vector(a, b, mask)
+
+
+def _rows_of_springs(context, builder, signature, arguments):
+    """Return pointers to the rows of an array at one end of eight springs."""
+    s, end = arguments[2:4]
+    ends = context.make_array(signature.args[1])(context, builder, arguments[1]).data
+    entries = [
+        builder.add(builder.mul(builder.add(s, s.type(lane)), s.type(2)), end)
+        for lane in range(LANES)
+    ]
+    rows = [builder.load(builder.gep(ends, [entry])) for entry in entries]
+    signature = types.none(signature.args[0], types.intp)
+    return [_row(context, builder, signature, (arguments[0], row)) for row in rows]
 
 
 def _row(context, builder, signature, arguments):

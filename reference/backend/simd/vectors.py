@@ -1,11 +1,11 @@
 """Functions on vector registers: arrays in the interpreter, instructions in compiled kernels.
 
-*Lanes* are the same joint of eight poses side by side. A kernel on tuples of components also runs
-on lanes. `in_lanes` replaces the functions that read and write a pose by functions on tiles. Data
-shared by all poses, such as a skeleton's offsets, stay unchanged. No operation mixes lanes: every
-pose gets the same bits as by itself. A *tile* is as many poses of a batch as there are lanes,
-(lane, joint, component). A *scratch* array, (joint, component, lane), holds unit quaternions in the
-order of the registers.
+*Lanes* are the same joint of eight poses side by side, or eight springs. A kernel on tuples of
+components also runs on lanes. `in_lanes` replaces the functions that read and write a pose by
+functions on tiles. Data shared by all poses, such as a skeleton's offsets, stay unchanged. No
+operation mixes lanes: every pose gets the same bits as by itself. A *tile* is as many poses of a
+batch as there are lanes, (lane, joint, component). A *scratch* array, (joint, component, lane),
+holds unit quaternions in the order of the registers.
 
 A *row* is four right-hand sides of an unknown, a row of an array (unknown, 4), which is loaded,
 changed and stored whole. Three right-hand sides leave the fourth at zero.
@@ -56,6 +56,36 @@ def load_lanes(scratch, j):
 def store_lanes(scratch, j, value):
     """Write a tuple of lanes, or of floats for all, into row j of an array (joint, 4, lane)."""
     scratch[j, 0], scratch[j, 1], scratch[j, 2], scratch[j, 3] = value
+
+
+@in_vector_registers
+def load_entries(values, s):
+    """Return the entries from s on of an array as lanes."""
+    return values[s : s + LANES].copy()
+
+
+@in_vector_registers
+def gather_vectors(x, ends, s, end):
+    """Return the rows of x (particle, 4) at one end of the springs from s on as three lanes."""
+    return tuple(x[ends[s : s + LANES, end], :3].T.copy())
+
+
+@in_vector_registers
+def scatter_vectors(x, ends, s, end, value):
+    """Add three lanes to the rows that `gather_vectors` reads, one after the other."""
+    np.add.at(x[:, :3], ends[s : s + LANES, end], np.transpose(value))
+
+
+@in_vector_registers
+def square_root(value):
+    """Return the root of every lane."""
+    return np.sqrt(value)
+
+
+@in_vector_registers
+def larger(value, other):
+    """Return the larger of two in every lane."""
+    return np.where(value >= other, value, other)
 
 
 @in_vector_registers
