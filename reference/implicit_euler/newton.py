@@ -172,7 +172,7 @@ def newton_step(memory, x_n, v_n, external, targets, begin, h, stop):
     return *step_end(x_n, x, h, history[:, : count + 1].copy()), at_floor, outcome
 
 
-class Work(NamedTuple):
+class Workspace(NamedTuple):
     """What an iteration writes to."""
 
     blocks: np.ndarray  # of the springs, (spring, 3, 3)
@@ -193,7 +193,7 @@ class Work(NamedTuple):
 def work_for(model, n):
     """Return room for the iterations of n particles."""
     pattern = model.factor
-    return Work(
+    return Workspace(
         np.empty((len(model.places), 3, 3)),
         np.empty(9 * model.starts[n]),
         np.empty(3 * n),
