@@ -215,8 +215,10 @@ class ImplicitEuler:
         if self.start != "y":
             start = self.start or STARTS[0]
             begin = begin_at(start, system, state, self.h, external_forces, pin_positions)
-        motion = state.positions, state.velocities, external, targets
-        return solver.step(*motion, NOWHERE if begin is None else begin, self.h, stop)
+        motion = state.positions, state.velocities
+        return solver.step(
+            motion, external, targets, NOWHERE if begin is None else begin, self.h, stop
+        )
 
     def _minimised(self, objective: Objective) -> StepEnd:
         """Return the end of a step by the solver's iterates."""

@@ -5,36 +5,25 @@ until the sum is positive definite, a Levenberg shift in the metric of M. An end
 without a negative eigenvalue, which may cost a last factorisation.
 """
 
-import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
-
-import numpy as np
+from typing import Any
 
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
-from ..backend.memory import packed, part
-from ..explicit import overwrite
-from ..mass_spring import MassSpring, SystemArrays, fill_blocks, sum_springs
-from ..sparse.assembly import add_blocks
-from ..sparse.dissection import Graph
-from ..sparse.multifrontal import Scratch, eliminate_fronts, scratch_for
-from ..sparse.symbolic import Supernodes, SymbolicFactor, UpdateTree
-from ..sparse.triangular import REGISTER, RIGHT_HAND_SIDES, solve
+from ..mass_spring import MassSpring
+from ..sparse.multifrontal import eliminate_fronts
 from .factor_cache import hessian_factor
 from .line_search import fill_end
-from .objective import Iterate, Objective, effective_stiffnesses
-from .stopping import AT_ROUNDING, CONVERGED, DIVERGED, GO_ON, SADDLE, outcome_at
-from .terms import (
-    blend_dampers,
-    fill_gradient,
-    hessian_error,
-    inertial_positions,
-    is_finite,
-    move_free,
-    rounding_coefficients,
-    standing,
-    step_end,
+from .objective import Iterate, Objective
+from .terms import hessian_error
+from .whole_step import (
+    Iteration,
+    buffers_for,
+    fill_descent,
+    fill_hessian,
+    model_in,
+    packed_model,
+    step_by,
 )
 
 # Shifts of an indefinite Hessian, times M. Growth outruns decay, for few factorisations. Near a
@@ -54,7 +43,7 @@ class Newton:
         self._memory = packed_model(system, h, self._analysed.pattern)
 
     def step(self, *arguments: Any) -> tuple[FloatArray, FloatArray, bool, int]:
-        """Return what `newton_step` returns, of the arguments after its first."""
+        """Return what `step_by` returns, of its arguments after the first two."""
         return _step(self._memory, *arguments)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
@@ -67,252 +56,49 @@ class Newton:
             iterate = objective.iterate_of(*end) if found else iterate
 
 
-class Model(NamedTuple):
-    """What all steps of a length share; dampers of tension-only springs are separate springs."""
-
-    system: SystemArrays
-    stiffnesses: np.ndarray  # k + c/h [N/m], (spring,)
-    free: np.ndarray  # whether each particle is, (particle,)
-    places: np.ndarray  # of the blocks of springs in the Hessian; see `BlockSum`
-    ends: np.ndarray
-    starts: np.ndarray
-    diagonal: np.ndarray  # the places of the diagonal, (3 particle,)
-    masses: np.ndarray  # on the diagonal, (3 particle,)
-    factor: SymbolicFactor
-    damped: bool
-    most_springs: int  # of a particle
-
-
-def packed_model(system: MassSpring, h: float, factor: SymbolicFactor) -> FloatArray:
-    """Return the arrays of a `Model` as one block of memory."""
-    separate = system.with_separate_dampers
-    arrays, assembly = separate.arrays, separate.free_blocks
-    graph, order, place, blocks, updates = factor
-    degrees = np.bincount(arrays.springs.ravel(), minlength=1)
-    numbers = blocks.tallest, updates.highest, updates.entries, system.damped, degrees.max()
-    return packed(
-        np.array(numbers, dtype=np.int64),
-        *arrays,
-        effective_stiffnesses(separate, h),
-        system.free,
-        *assembly.places,
-        assembly.diagonal.astype(np.int64),
-        np.repeat(system.free_masses, 3),
-        *graph,
-        order,
-        place,
-        *blocks[:3],
-        *updates[:2],
-    )
-
-
-def model_in(memory):
-    """Return the `Model` in a block of memory."""
-    numbers = part(memory, 0, np.int64)
-    system = SystemArrays(
-        part(memory, 1, np.float64),
-        pairs(part(memory, 2, np.int64), 2),
-        part(memory, 3, np.float64),
-        part(memory, 4, np.float64),
-        part(memory, 5, np.float64),
-        part(memory, 6, np.bool_),
-        part(memory, 7, np.int64),
-        part(memory, 8, np.float64),
-    )
-    graph = Graph(part(memory, 16, np.int32), part(memory, 17, np.int32))
-    columns, starts = part(memory, 20, np.int32), part(memory, 21, np.int64)
-    blocks = Supernodes(columns, starts, part(memory, 22, np.int32), numbers[0])
-    begins, children = part(memory, 23, np.int64), part(memory, 24, np.int32)
-    updates = UpdateTree(begins, children, numbers[1], numbers[2])
-    order, place = part(memory, 18, np.int32), part(memory, 19, np.int32)
-    return Model(
-        system,
-        part(memory, 9, np.float64),
-        part(memory, 10, np.bool_),
-        pairs(part(memory, 11, np.int32), 4),
-        pairs(part(memory, 12, np.int32), 2),
-        part(memory, 13, np.int32),
-        part(memory, 14, np.int64),
-        part(memory, 15, np.float64),
-        SymbolicFactor(graph, order, place, blocks, updates),
-        numbers[3] > 0,
-        numbers[4],
-    )
-
-
-def pairs(values, count):
-    """Return an array as rows of so many."""
-    return values.reshape((len(values) // count, count))
-
-
-def newton_step(memory, x_n, v_n, external, targets, begin, h, stop):
-    """Make a step of implicit Euler by Newton's method.
-
-    `targets` are the positions of the pins at the end of the step, none if they stay; `begin` is
-    where the free particles begin, empty for y; `stop` is the tolerance and the limit of
-    iterations.
-
-    Returns:
-        positions and velocities, (2, particle, 3); the residual and g before and after each
-        iteration, (2, iterations + 1), empty if the start overflows; whether the gradient is at the
-        floor; the outcome.
-    """
-    model = model_in(memory)
-    system, rest_lengths, constant = model.system, model.system.rest_lengths, 0.0
-    if model.damped:
-        rest_lengths, constant = blend_dampers(x_n, h, model.stiffnesses, system)
-    y = inertial_positions(x_n, v_n, h, system.pinned, targets)
-    elastic = rest_lengths, model.stiffnesses, system.tension_only
-    terms = h, constant, (y, external, system.masses), system.springs, elastic, system.pinned
-    sums = sum_springs(system.masses, system.springs, rest_lengths, model.stiffnesses)
-    floor = rounding_coefficients(y, external, h, system.masses, sums, model.free)
-    work, history, x = work_for(model, len(y)), np.empty((2, stop[1] + 1)), y.copy()
-    start = begin, x
-    count, at_floor, outcome = minimise(model, work, start, terms, floor, history, stop)
-    return *step_end(x_n, x, h, history[:, : count + 1].copy()), at_floor, outcome
-
-
-class Workspace(NamedTuple):
-    """What an iteration writes to."""
-
-    blocks: np.ndarray  # of the springs, (spring, 3, 3)
-    data: np.ndarray  # of the Hessian
-    unshifted: np.ndarray  # its diagonal, (3 particle,)
-    values: np.ndarray  # of the factor
-    scratch: Scratch
-    right: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
-    unknowns: np.ndarray  # (3 particle, REGISTER)
-    solution: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
-    gradient: np.ndarray  # all of (particle, 3)
-    step: np.ndarray
-    end: np.ndarray
-    end_gradient: np.ndarray
-    room: tuple[np.ndarray, np.ndarray]  # see `rounding_sums`
-
-
-def work_for(model, n):
-    """Return room for the iterations of n particles."""
-    pattern = model.factor
-    return Workspace(
-        np.empty((len(model.places), 3, 3)),
-        np.empty(9 * model.starts[n]),
-        np.empty(3 * n),
-        np.empty(pattern.updates.entries),
-        scratch_for(pattern.blocks, pattern.updates, 3 * n),
-        np.zeros((3 * n, RIGHT_HAND_SIDES)),
-        np.empty((3 * n, REGISTER)),
-        np.empty((3 * n, RIGHT_HAND_SIDES)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
-        np.empty((n, 3)),
-        (np.empty(n), np.empty(n)),
-    )
-
-
-def minimise(model, work, start, terms, floor, history, stop):
-    """Iterate until `outcome_at` says so; return the number of iterations, at_floor, the outcome.
-
-    `start` is of the positions to begin at, and of x, which is y and becomes the end. `floor` is of
-    the coefficients of the floor. The number of iterations is -1 if the start overflows.
-    """
-    (begin, x), gradient = start, work.gradient
-    value, norm, reach = fill_gradient(x, terms, gradient)
-    first, count, best, at_floor, outcome = norm, -1, 0, False, GO_ON
-    shift, found, convex = 0.0, True, False
-    if len(begin) > 0 and is_finite(value, norm, floor[0] + floor[1] * reach):
-        move_free(x, begin, model.free)
-        value, norm, reach = fill_gradient(x, terms, gradient)
-    while outcome == GO_ON:
-        bound = floor[0] + floor[1] * reach
-        if not is_finite(value, norm, bound):
-            return count, at_floor, DIVERGED
-        if count >= 0 and found:
-            overwrite(x, work.end)
-            overwrite(gradient, work.end_gradient)
-        count += 1
-        residual, at_floor, at_rest = standing(x, norm, bound, terms, first, work.room)
-        history[0, count], history[1, count] = residual, value
-        if residual < history[0, best]:
-            best = count
-        outcome, at_end = outcome_at(count, stop, residual, best, not found, at_floor, at_rest)
-        solved = outcome in (CONVERGED, AT_ROUNDING)
-        if solved and not convex and is_saddle(model, work, x, terms):
-            outcome = SADDLE if at_end else GO_ON
-        if outcome == GO_ON:
-            before = shift if count > 0 else math.inf
-            start = x, gradient, value
-            end, found, shift = newton_iteration(model, work, start, terms, shift)
-            convex = shift == 0.0 and before == 0.0
-            if found:
-                value, norm, reach = end
-    return count, at_floor, outcome
-
-
-def newton_iteration(model, work, start, terms, shift):
+def newton_iteration(model, buffers, start, terms, shift):
     """Fill in the end; return its g, norm and reach, whether it is better, and the shift.
 
     The search for a shift begins below the last, which so decays when no longer needed.
     """
-    fill_hessian(model, work, start[0], terms)
+    fill_hessian(model, buffers, start[0], terms, True)
     for i in range(len(model.diagonal)):
-        work.unshifted[i] = work.data[model.diagonal[i]]
+        buffers.unshifted[i] = buffers.data[model.diagonal[i]]
     shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
-    while not is_factorised(model, work, shift):
+    while not is_factorised(model, buffers, shift):
         shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
-    fill_descent(model.factor, work, start[1])
-    end, found = fill_end(start, work.step, terms, work.end, work.end_gradient, work.room)
+    fill_descent(model.factor, buffers, start[1])
+    end, found = fill_end(
+        start, buffers.step, terms, buffers.end, buffers.end_gradient, buffers.room
+    )
     return end, found, shift
 
 
-def is_factorised(model, work, shift):
+def is_factorised(model, buffers, shift):
     """Factorise the Hessian plus a multiple of M; return whether the sum is positive definite."""
     for i in range(len(model.diagonal)):
-        work.data[model.diagonal[i]] = work.unshifted[i] + shift * model.masses[i]
-    return eliminate_fronts(model.factor, work.data, work.values, work.scratch) < 0
+        buffers.data[model.diagonal[i]] = buffers.unshifted[i] + shift * model.masses[i]
+    return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) < 0
 
 
 def iterate_once(memory, start, terms, shift):
     """Return positions, gradient and what `newton_iteration` returns."""
     model = model_in(memory)
-    work = work_for(model, len(start[0]))
-    end, found, shift = newton_iteration(model, work, start, terms, shift)
-    return (work.end, work.end_gradient, *end), found, shift
+    buffers = buffers_for(model, len(start[0]))
+    end, found, shift = newton_iteration(model, buffers, start, terms, shift)
+    return (buffers.end, buffers.end_gradient, *end), found, shift
 
 
-def fill_hessian(model, work, x, terms):
-    """Fill in the data of the Hessian of g at x."""
-    h, _, _, springs, elastic, _ = terms
-    fill_blocks(x, springs, elastic, h * h, True, work.blocks)
-    for e in range(len(work.data)):
-        work.data[e] = 0.0
-    add_blocks(work.blocks, model.places, model.ends, model.starts, work.data)
-    for i in range(len(model.masses)):
-        work.data[model.diagonal[i]] += model.masses[i]
-
-
-def fill_descent(factor, work, gradient):
-    """Fill in the solution of H s = -grad g from the factor's values."""
-    for i in range(len(gradient)):
-        for c in range(3):
-            work.right[3 * i + c, 0] = -gradient[i, c]
-    columns, starts, rows, _ = factor.blocks
-    x = work.solution
-    solve(factor.order, columns, starts, rows, work.values, work.right, work.unknowns, x)
-    for i in range(len(gradient)):
-        for c in range(3):
-            work.step[i, c] = x[3 * i + c, 0]
-
-
-def is_saddle(model, work, x, terms):
+def is_saddle(model, buffers, x, terms):
     """Return whether the Hessian at x has a negative eigenvalue, beyond rounding."""
-    rest_lengths, room = model.system.rest_lengths, work.room[0]
+    rest_lengths, room = model.system.rest_lengths, buffers.room[0]
     error = hessian_error(x, rest_lengths, terms, model.free, model.most_springs, room)
-    fill_hessian(model, work, x, terms)
+    fill_hessian(model, buffers, x, terms, True)
     for i in model.diagonal:
-        work.data[i] += error
-    return eliminate_fronts(model.factor, work.data, work.values, work.scratch) >= 0
+        buffers.data[i] += error
+    return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0
 
 
-_step = Kernel(newton_step, label="steps by Newton's method")
+NEWTON = Iteration(newton_iteration, is_saddle)
+_step = Kernel(step_by, constants=(NEWTON,), label="steps by Newton's method")
 _iteration = Kernel(iterate_once, label="Newton's iterations")
