@@ -5,16 +5,19 @@ The step solves (Baraff and Witkin 1998, without geometric stiffness; MuJoCo's i
 
     (M + h C + h² J' k J) dv = h (f - h J' k J v_n),
 
-where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. See
-docs/implicit_euler.md.
+where J is the Jacobian of the lengths, and f all forces with the dampers' -C v_n. Conjugate
+gradients solve it where h² k is small beside the masses, and a factor elsewhere: `iteration_limit`
+in `conjugate_gradients` decides, once for a system and h. See docs/implicit_euler.md.
 """
 
 from collections.abc import Iterator
 
 import numpy as np
 
+from ..arguments import FloatArray
 from ..mass_spring import MassSpring
 from ..sparse import NotPositiveDefiniteError
+from .conjugate_gradients import iteration_limit, solve_linearised
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
 
@@ -27,6 +30,7 @@ class GaussNewton:
     def __init__(self, system: MassSpring, h: float) -> None:
         """Analyse the sparsity pattern, which the matrices of all steps share."""
         self._analysed = hessian_factor(system)
+        self._iteration_limit = iteration_limit(system, h, self._analysed)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield x_n with the pins at their targets, then the iterate after each iteration.
@@ -41,9 +45,20 @@ class GaussNewton:
         while True:
             yield iterate
             try:
-                factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
+                correction = self._correction(objective, x, gradient)
             except NotPositiveDefiniteError:  # the masses vanish beside h² k
                 continue
-            correction = factor.solve(gradient.ravel()).reshape(-1, 3)
             iterate = objective.iterate_at(iterate.positions - correction)
             x, gradient = iterate.positions, iterate.gradient
+
+    def _correction(self, objective: Objective, x: FloatArray, gradient: FloatArray) -> FloatArray:
+        """Return the gradient over the Hessian at x without geometric terms, (particle, 3) [m]."""
+        if self._iteration_limit:
+            arrays, limit = objective.effective.arrays, self._iteration_limit
+            elastic = arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only
+            terms = objective.h, arrays.masses, arrays.springs, elastic, arrays.pinned
+            correction, converged = solve_linearised(x, gradient, *terms, limit)
+            if converged:
+                return correction
+        factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
+        return factor.solve(gradient.ravel()).reshape(-1, 3)

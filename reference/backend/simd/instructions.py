@@ -265,6 +265,20 @@ def subtract_scaled(typingctx, row, factor, other):
 
 
 @intrinsic
+def dot_rows(typingctx, a, b):
+    """Multiply all four and add the products, in pairs."""
+
+    def generate(context, builder, signature, arguments):
+        products = builder.fmul(*arguments)
+        halves = [_shuffled(builder, products, products, half) for half in ((0, 1), (2, 3))]
+        pair = builder.fadd(*halves)
+        first, second = (builder.extract_element(pair, INT(k)) for k in (0, 1))
+        return builder.fadd(first, second)
+
+    return types.float64(row_type, row_type), generate
+
+
+@intrinsic
 def prefetch(typingctx, values, i):
     """Prefetch a cache line; the address may be invalid."""
 

@@ -119,6 +119,13 @@ def subtract_scaled(row, factor, other):
 
 
 @in_vector_registers
+def dot_rows(a, b):
+    """Return the scalar product of two rows, added in pairs."""
+    products = a * b
+    return (products[0] + products[2]) + (products[1] + products[3])
+
+
+@in_vector_registers
 def prefetch(values, i):
     """Load an entry to be read soon into the cache; the index may be out of range."""
 

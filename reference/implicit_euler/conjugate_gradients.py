@@ -1,0 +1,181 @@
+"""Conjugate gradients for the matrix of Gauss-Newton, M + h² K without geometric terms.
+
+The matrix is never assembled. With L_i L_i' its 3 x 3 diagonal block at particle i, the unknowns
+are scaled to L_i' dx_i (block Jacobi). The scaled matrix is the identity plus, for each spring from
+i to j, a block -a b' and its transpose,
+
+    a = (h² k)^1/2 L_i^-1 u,    b = (h² k)^1/2 L_j^-1 u.
+
+Since (a·p_i - b·p_j)² <= 2 (a·p_i)² + 2 (b·p_j)², its eigenvalues are at most 2. Since L_i L_i' is
+at most m_i + h² (sum of k over i's springs), they are at least the smallest ratio of m_i to this
+sum. Neither bound depends on positions.
+"""
+
+import math
+
+import numpy as np
+from numpy import uint64 as at
+
+from ..backend.compiled import Kernel
+from ..backend.simd.vectors import dot_rows, load_row, store_row, subtract_scaled
+from ..mass_spring import MassSpring, is_slack, spring_frame
+from ..quaternion import add, load_vector, scale, store_vector
+from ..sparse import CholeskyFactor
+from .objective import effective_stiffnesses
+from .terms import EPS
+
+# Of the scaled residual relative to the scaled gradient. Rounding errors of the gradient's sums of
+# four or more terms are as large.
+TOLERANCE = 4 * EPS
+# Multiplications of a product with the scaled matrix for each spring; and how many take as long as
+# assembling and solving with a factor takes for each unknown, measured on ropes and cloths.
+SPRING_MULTIPLICATIONS, UNKNOWN_MULTIPLICATIONS = 12, 2000
+
+
+def iteration_limit(system: MassSpring, h: float, factor: CholeskyFactor) -> int:
+    """Return the iterations that a step may take, 0 where a factor is expected to be faster.
+
+    `factor` has the pattern of the matrix. The rule is stated in docs/implicit_euler.md.
+    """
+    bound = iteration_bound(system, h)
+    springs, unknowns = len(system.with_separate_dampers.springs), len(factor.pattern.order)
+    direct = factor.multiplications + UNKNOWN_MULTIPLICATIONS * unknowns
+    return math.ceil(bound) if SPRING_MULTIPLICATIONS * springs * bound <= direct else 0
+
+
+@np.errstate(all="ignore")
+def iteration_bound(system: MassSpring, h: float) -> float:
+    """Return a number of iterations that suffices in exact arithmetic, for all positions.
+
+    If the largest eigenvalue is c times the smallest, n iterations divide the residual by at least
+    exp(2 n / c^1/2) / (2 c^1/2). Infinite or NaN where h² k overflows.
+    """
+    springs = system.with_separate_dampers
+    k = np.repeat(effective_stiffnesses(springs, h), 2)
+    sums = h * h * np.bincount(springs.springs.ravel(), k, system.particle_count)
+    ratios = (sums / system.free_masses)[system.free]
+    root = math.sqrt(2.0 + 2.0 * float(ratios.max(initial=0.0)))
+    return 0.5 * root * math.log(2.0 * root / TOLERANCE)
+
+
+def linearised_step(x, gradient, h, masses, springs, elastic, pinned, limit):
+    """Solve for a gradient, zero at the pins, with springs linearised at x.
+
+    `elastic` holds rest lengths, stiffnesses and tension_only. Return the solution, shape
+    (particle, 3), and whether it came within the tolerance in so many iterations.
+    """
+    n, rows = len(x), np.zeros((2 * len(springs), 4))
+    diagonals, lower, correction = np.empty((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
+    residual, solution = np.zeros((n, 4)), np.zeros((n, 4))
+    add_blocks(x, h * h, masses, springs, elastic, pinned, rows, diagonals, lower)
+    for i in range(n):
+        factorize_block(diagonals, lower, i)
+        store_vector(residual, i, eliminate(diagonals, lower, i, load_vector(gradient, i)))
+    for s in range(len(springs)):
+        for end in range(2):
+            row = at(2 * s + end)
+            a = eliminate(diagonals, lower, at(springs[s, end]), load_vector(rows, row))
+            store_vector(rows, row, a)
+    converged = conjugate_gradients(springs, rows, limit, residual, solution)
+    for i in range(n):
+        store_vector(correction, i, substitute(diagonals, lower, i, load_vector(solution, i)))
+    return correction, converged
+
+
+def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
+    """Store (h² k)^1/2 u of each spring, zero if slack, in two rows; sum the diagonal blocks.
+
+    A block has a diagonal xx, yy, zz, infinite at the pins, and yx, zx, zy below.
+    """
+    rest_lengths, stiffnesses, tension_only = elastic
+    for i in range(len(x)):
+        store_vector(diagonals, i, (masses[i], masses[i], masses[i]))
+    for i in pinned:
+        store_vector(diagonals, i, (math.inf, math.inf, math.inf))
+    for s in range(len(springs)):
+        length, u = spring_frame(x, at(springs[s, 0]), at(springs[s, 1]))
+        slack = is_slack(length, rest_lengths[s], tension_only[s])
+        a = scale(0.0 if slack else math.sqrt(hh * stiffnesses[s]), u)
+        squares = a[0] * a[0], a[1] * a[1], a[2] * a[2]
+        products = a[1] * a[0], a[2] * a[0], a[2] * a[1]
+        for end in range(2):
+            particle = at(springs[s, end])
+            store_vector(rows, at(2 * s + end), a)
+            store_vector(diagonals, particle, add(load_vector(diagonals, particle), squares))
+            store_vector(lower, particle, add(load_vector(lower, particle), products))
+
+
+def factorize_block(diagonals, lower, i):
+    """Replace a block by its Cholesky factor, with the inverses of the diagonal."""
+    (xx, yy, zz), (yx, zx, zy) = load_vector(diagonals, i), load_vector(lower, i)
+    p = 1.0 / math.sqrt(xx)
+    yx, zx = yx * p, zx * p
+    q = 1.0 / math.sqrt(yy - yx * yx)
+    zy = (zy - zx * yx) * q
+    store_vector(diagonals, i, (p, q, 1.0 / math.sqrt(zz - zx * zx - zy * zy)))
+    store_vector(lower, i, (yx, zx, zy))
+
+
+def eliminate(inverses, lower, i, v):
+    """Return L_i^-1 v."""
+    (p, q, r), (yx, zx, zy) = load_vector(inverses, i), load_vector(lower, i)
+    x = p * v[0]
+    y = q * (v[1] - yx * x)
+    return x, y, r * (v[2] - zx * x - zy * y)
+
+
+def substitute(inverses, lower, i, v):
+    """Return L_i'^-1 v."""
+    (p, q, r), (yx, zx, zy) = load_vector(inverses, i), load_vector(lower, i)
+    z = r * v[2]
+    y = q * (v[1] - zy * z)
+    return p * (v[0] - yx * y - zx * z), y, z
+
+
+def conjugate_gradients(springs, rows, limit, residual, solution):
+    """Solve the scaled system from zero (Hestenes and Stiefel 1952); see `linearised_step`."""
+    direction, product = residual.copy(), np.empty(residual.shape)
+    z, r = solution.reshape(solution.size), residual.reshape(residual.size)
+    p, q = direction.reshape(direction.size), product.reshape(product.size)
+    size = inner(r, r)
+    bound = TOLERANCE * TOLERANCE * size
+    for _ in range(limit):
+        multiply(springs, rows, direction, product)
+        curvature = inner(p, q)
+        if not curvature > 0.0:  # r is zero, underflows or overflows
+            return False
+        step, before = size / curvature, size
+        for k in range(len(r)):
+            z[k] += step * p[k]
+            r[k] -= step * q[k]
+        size = inner(r, r)
+        if size <= bound < math.inf:
+            return True
+        for k in range(len(r)):
+            p[k] = r[k] + size / before * p[k]
+    return False
+
+
+def inner(a, b):
+    """Return the scalar product of two rows."""
+    total = 0.0
+    for k in range(len(a)):
+        total += a[k] * b[k]
+    return total
+
+
+def multiply(springs, rows, direction, product):
+    """Set the product to the scaled matrix times the direction, both of shape (particle, 4)."""
+    for k in range(len(direction)):
+        store_row(product, at(k), load_row(direction, at(k)))
+    for s in range(len(springs)):
+        i, j = at(springs[at(s), 0]), at(springs[at(s), 1])
+        a, b = load_row(rows, at(2 * s)), load_row(rows, at(2 * s + 1))
+        p, q = dot_rows(a, load_row(direction, i)), dot_rows(b, load_row(direction, j))
+        store_row(product, i, subtract_scaled(load_row(product, i), q, a))
+        store_row(product, j, subtract_scaled(load_row(product, j), p, b))
+
+
+solve_linearised = Kernel(
+    linearised_step, relaxed=True, label="a linearised step of implicit Euler"
+)
