@@ -134,22 +134,25 @@ def substitute(inverses, lower, i, v):
 
 def conjugate_gradients(springs, rows, limit, residual, solution):
     """Solve the scaled system from zero (Hestenes and Stiefel 1952); see `linearised_step`."""
-    direction, product = residual.copy(), np.empty(residual.shape)
     z, r = solution.reshape(solution.size), residual.reshape(residual.size)
+    length = math.sqrt(inner(r, r))
+    if not 0.0 < length < math.inf:
+        return False
+    for k in range(len(r)):
+        r[k] /= length  # no number below leaves the floats
+    direction, product = residual.copy(), np.empty(residual.shape)
     p, q = direction.reshape(direction.size), product.reshape(product.size)
     size = inner(r, r)
-    bound = TOLERANCE * TOLERANCE * size
     for _ in range(limit):
         multiply(springs, rows, direction, product)
-        curvature = inner(p, q)
-        if not curvature > 0.0:  # r is zero, underflows or overflows
-            return False
-        step, before = size / curvature, size
+        step, before = size / inner(p, q), size
         for k in range(len(r)):
             z[k] += step * p[k]
             r[k] -= step * q[k]
         size = inner(r, r)
-        if size <= bound < math.inf:
+        if size <= TOLERANCE * TOLERANCE:
+            for k in range(len(r)):
+                z[k] *= length
             return True
         for k in range(len(r)):
             p[k] = r[k] + size / before * p[k]
