@@ -226,7 +226,7 @@ def test_mujoco_is_timed_from_its_own_state_without_conversions_and_energies(
 
 
 def test_mujoco_is_timed_at_its_default_tolerance_and_shown_at_a_tight_one_with_both_errors():
-    """The errors belong to the step of a direct solve; one that is only shown leads nowhere."""
+    """The errors are distances to our step; one that is only shown leads nowhere."""
     default, problem = mujoco.MjOption(), cloth_swing(1)
     cases = {case.solver: case for case in timing_cases.cloth_cases()
              if case.work.problem == "cloth/x1/implicit Euler, linearised once"}  # fmt: skip

@@ -369,7 +369,7 @@ def mujoco_steps(
 
 
 def step_error(engine: Callable[..., Any], problem: ClothSwing) -> float:
-    """Return the error of MuJoCo's linearised step relative to its length, by a direct solve."""
+    """Return the distance of MuJoCo's linearised step to ours relative to its length."""
     exact = stepping(problem, solver="gauss_newton")().state.positions
     start = moving(problem).positions
     return metrics.relative_error(engine(problem)().read().positions, exact, start)
