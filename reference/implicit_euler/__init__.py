@@ -148,9 +148,8 @@ class ImplicitEuler:
             ValueError: if the state has another number of particles, or the external forces or pin
                 positions have another shape or are not finite.
         """
-        if isinstance(self._solver, Newton):
-            end = self._newton_step(self._solver, state, external_forces, pin_positions)
-        else:
+        end = self._in_one_kernel(state, external_forces, pin_positions)
+        if end is None:
             with np.errstate(over="ignore", invalid="ignore"):  # overflow ends in DIVERGED
                 end = self._minimised(self.objective(state, external_forces, pin_positions))
         return _result(state, *end)
@@ -195,14 +194,12 @@ class ImplicitEuler:
         """
         return self._solver.iterates(self.objective(state, external_forces, pin_positions))
 
-    def _newton_step(
-        self,
-        solver: Newton,
-        state: State,
-        external_forces: ArrayLike | None,
-        pin_positions: ArrayLike | None,
-    ) -> StepEnd:
-        """Return the end of a step by Newton's method in a kernel."""
+    def _in_one_kernel(
+        self, state: State, external_forces: ArrayLike | None, pin_positions: ArrayLike | None
+    ) -> StepEnd | None:
+        """Return the end of a step by `step_by`, None if the solver does not step so."""
+        if not isinstance(self._solver, Newton | GaussNewton):
+            return None
         system = self.system
         check_particles(system, state)
         external = system.weights
@@ -216,7 +213,7 @@ class ImplicitEuler:
             start = self.start or STARTS[0]
             begin = begin_at(start, system, state, self.h, external_forces, pin_positions)
         motion = state.positions, state.velocities
-        return solver.step(
+        return self._solver.step(
             motion, external, targets, NOWHERE if begin is None else begin, self.h, stop
         )
 

@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.compiled import Kernel
+from ..backend.compiled import relaxed
 from ..backend.simd.vectors import dot_rows, load_row, store_row, subtract_scaled
 from ..mass_spring import MassSpring, is_slack, spring_frame
 from ..quaternion import add, load_vector, scale, store_vector
@@ -58,6 +58,7 @@ def iteration_bound(system: MassSpring, h: float) -> float:
     return 0.5 * root * math.log(2.0 * root / TOLERANCE)
 
 
+@relaxed
 def linearised_step(x, gradient, h, masses, springs, elastic, pinned, limit):
     """Solve for a gradient, zero at the pins, with springs linearised at x.
 
@@ -177,8 +178,3 @@ def multiply(springs, rows, direction, product):
         p, q = dot_rows(a, load_row(direction, i)), dot_rows(b, load_row(direction, j))
         store_row(product, i, subtract_scaled(load_row(product, i), q, a))
         store_row(product, j, subtract_scaled(load_row(product, j), p, b))
-
-
-solve_linearised = Kernel(
-    linearised_step, relaxed=True, label="a linearised step of implicit Euler"
-)

@@ -11,15 +11,26 @@ in `conjugate_gradients` decides, once for a system and h. See docs/implicit_eul
 """
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from ..arguments import FloatArray
+from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring
-from ..sparse import NotPositiveDefiniteError
-from .conjugate_gradients import iteration_limit, solve_linearised
+from ..sparse.multifrontal import eliminate_fronts
+from .conjugate_gradients import iteration_limit, linearised_step
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
+from .terms import fill_gradient
+from .whole_step import (
+    Iteration,
+    fill_descent,
+    fill_hessian,
+    iterate_by,
+    packed_model,
+    step_by,
+)
 
 
 class GaussNewton:
@@ -29,36 +40,72 @@ class GaussNewton:
 
     def __init__(self, system: MassSpring, h: float) -> None:
         """Analyse the sparsity pattern, which the matrices of all steps share."""
-        self._analysed = hessian_factor(system)
-        self._iteration_limit = iteration_limit(system, h, self._analysed)
+        analysed = hessian_factor(system)
+        self._model = system, h, analysed.pattern
+        self.limit_products(iteration_limit(system, h, analysed))
+
+    def limit_products(self, limit: int) -> None:
+        """Let conjugate gradients take so many iterations before a factor is made, 0 for none."""
+        self.product_limit = limit
+        self._memory = packed_model(*self._model, limit)
+
+    def step(
+        self, motion: Any, external: FloatArray, targets: FloatArray, *arguments: Any
+    ) -> tuple[FloatArray, FloatArray, bool, int] | None:
+        """Return what `step_by` returns, of its arguments after the first two; None if pins move.
+
+        The pull of pins that move belongs to the first iteration only.
+        """
+        return None if len(targets) else _step(self._memory, motion, external, targets, *arguments)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield x_n with the pins at their targets, then the iterate after each iteration.
 
         Where the matrix is singular to rounding, yield the last iterate again.
         """
-        x = objective.x_n
-        iterate = objective.iterate_at(x)
-        gradient = iterate.gradient + objective.pin_gradient_at(x, geometric=False)
-        if np.any(objective.y[objective.system.pinned] != x[objective.system.pinned]):
-            iterate = objective.iterate_at(np.where(objective.system.free[:, None], x, objective.y))
+        x, y, free = objective.x_n, objective.y, objective.system.free[:, None]
+        gradient = objective.iterate_at(x).gradient
+        gradient = gradient + objective.pin_gradient_at(x, geometric=False)
+        iterate = objective.start
         while True:
             yield iterate
-            try:
-                correction = self._correction(objective, x, gradient)
-            except NotPositiveDefiniteError:  # the masses vanish beside h² k
-                continue
-            iterate = objective.iterate_at(iterate.positions - correction)
-            x, gradient = iterate.positions, iterate.gradient
+            start = x, gradient, iterate.value
+            end, found, _ = _iteration(self._memory, start, objective.terms, 0.0)
+            if found:
+                iterate = objective.iterate_at(np.where(free, end[0], y))
+                x, gradient = iterate.positions, iterate.gradient
 
-    def _correction(self, objective: Objective, x: FloatArray, gradient: FloatArray) -> FloatArray:
-        """Return the gradient over the Hessian at x without geometric terms, (particle, 3) [m]."""
-        if self._iteration_limit:
-            arrays, limit = objective.effective.arrays, self._iteration_limit
-            elastic = arrays.rest_lengths, arrays.stiffnesses, arrays.tension_only
-            terms = objective.h, arrays.masses, arrays.springs, elastic, arrays.pinned
-            correction, converged = solve_linearised(x, gradient, *terms, limit)
-            if converged:
-                return correction
-        factor = self._analysed.refactorize(objective.hessian_at(x, geometric=False))
-        return factor.solve(gradient.ravel()).reshape(-1, 3)
+
+def gauss_newton_iteration(model, buffers, start, terms, number):
+    """Fill in the end and return as an `Iteration` does; the last number has no meaning.
+
+    There is no end where the matrix is singular to rounding: the masses vanish beside h² k.
+    """
+    (x, gradient, value), end = start, buffers.end
+    h, _, (_, _, masses), springs, elastic, pinned = terms
+    converged = False
+    if model.product_limit > 0:
+        arguments = h, masses, springs, elastic, pinned, model.product_limit
+        step, converged = linearised_step(x, gradient, *arguments)
+        for i in range(len(x)):
+            for c in range(3):
+                end[i, c] = x[i, c] - step[i, c]
+    if not converged:
+        fill_hessian(model, buffers, x, terms, False)
+        if eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
+            return (value, 0.0, 0.0), False, number
+        fill_descent(model.factor, buffers, gradient)
+        for i in range(len(x)):
+            for c in range(3):
+                end[i, c] = x[i, c] + buffers.step[i, c]
+    return fill_gradient(end, terms, buffers.end_gradient), True, number
+
+
+def never(model, buffers, x, terms):
+    """Refuse no end: linearised springs have no saddle."""
+    return False
+
+
+GAUSS_NEWTON = Iteration(gauss_newton_iteration, never)
+_step = Kernel(step_by, constants=(GAUSS_NEWTON,), label="linearised steps of implicit Euler")
+_iteration = Kernel(iterate_by, constants=(GAUSS_NEWTON,), label="linearised iterations")

@@ -18,10 +18,9 @@ from .objective import Iterate, Objective
 from .terms import hessian_error
 from .whole_step import (
     Iteration,
-    buffers_for,
     fill_descent,
     fill_hessian,
-    model_in,
+    iterate_by,
     packed_model,
     step_by,
 )
@@ -81,14 +80,6 @@ def is_factorised(model, buffers, shift):
     return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) < 0
 
 
-def iterate_once(memory, start, terms, shift):
-    """Return positions, gradient and what `newton_iteration` returns."""
-    model = model_in(memory)
-    buffers = buffers_for(model, len(start[0]))
-    end, found, shift = newton_iteration(model, buffers, start, terms, shift)
-    return (buffers.end, buffers.end_gradient, *end), found, shift
-
-
 def is_saddle(model, buffers, x, terms):
     """Return whether the Hessian at x has a negative eigenvalue, beyond rounding."""
     rest_lengths, room = model.system.rest_lengths, buffers.room[0]
@@ -101,4 +92,4 @@ def is_saddle(model, buffers, x, terms):
 
 NEWTON = Iteration(newton_iteration, is_saddle)
 _step = Kernel(step_by, constants=(NEWTON,), label="steps by Newton's method")
-_iteration = Kernel(iterate_once, label="Newton's iterations")
+_iteration = Kernel(iterate_by, constants=(NEWTON,), label="Newton's iterations")

@@ -54,15 +54,19 @@ class Model(NamedTuple):
     factor: SymbolicFactor
     damped: bool
     most_springs: int  # of a particle
+    product_limit: int  # iterations of conjugate gradients in a linearised step
 
 
-def packed_model(system: MassSpring, h: float, factor: SymbolicFactor) -> FloatArray:
+def packed_model(
+    system: MassSpring, h: float, factor: SymbolicFactor, product_limit: int = 0
+) -> FloatArray:
     """Return the arrays of a `Model` as one block of memory."""
     separate = system.with_separate_dampers
     arrays, assembly = separate.arrays, separate.free_blocks
     graph, order, place, blocks, updates = factor
     degrees = np.bincount(arrays.springs.ravel(), minlength=1)
-    numbers = blocks.tallest, updates.highest, updates.entries, system.damped, degrees.max()
+    sizes = blocks.tallest, updates.highest, updates.entries
+    numbers = *sizes, system.damped, degrees.max(), product_limit
     return packed(
         np.array(numbers, dtype=np.int64),
         *arrays,
@@ -110,6 +114,7 @@ def model_in(memory):
         SymbolicFactor(graph, order, place, blocks, updates),
         numbers[3] > 0,
         numbers[4],
+        numbers[5],
     )
 
 
@@ -220,6 +225,14 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
             if found:
                 value, norm, reach = end
     return count, at_floor, outcome
+
+
+def iterate_by(method, memory, start, terms, shift):
+    """Return positions, gradient and what an `Iteration` returns."""
+    model = model_in(memory)
+    buffers = buffers_for(model, len(start[0]))
+    end, found, shift = method.advance(model, buffers, start, terms, shift)
+    return (buffers.end, buffers.end_gradient, *end), found, shift
 
 
 def fill_hessian(model, buffers, x, terms, geometric):

@@ -5,12 +5,13 @@ import pytest
 import scipy.sparse
 
 from plumbob.reference import scenes
-from plumbob.reference.implicit_euler import ImplicitEuler
+from plumbob.reference.backend.compiled import Kernel, set_backend
+from plumbob.reference.implicit_euler import ImplicitEuler, gauss_newton
 from plumbob.reference.implicit_euler.conjugate_gradients import (
     TOLERANCE,
     iteration_bound,
     iteration_limit,
-    solve_linearised,
+    linearised_step,
 )
 from plumbob.reference.implicit_euler.factor_cache import hessian_factor
 from plumbob.reference.mass_spring import MassSpring, State, lengths
@@ -20,6 +21,7 @@ from plumbob.reference.sparse import CholeskyFactor
 pytestmark = pytest.mark.both_backends
 
 h, MANY = 0.02, 10_000
+solve_linearised = Kernel(linearised_step, relaxed=True)
 
 
 def integrators(system, step=h, **settings):
@@ -27,8 +29,8 @@ def integrators(system, step=h, **settings):
     iterative, direct = (
         ImplicitEuler(system, h=step, solver="gauss_newton", **settings) for _ in range(2)
     )
-    iterative._solver._iteration_limit, direct._solver._iteration_limit = MANY, 0
-    iterative._solver._analysed = None
+    iterative._solver.limit_products(MANY)
+    direct._solver.limit_products(0)
     return iterative, direct
 
 
@@ -155,7 +157,7 @@ def test_on_both_sides_of_the_rule_steps_are_the_same(size, backend):
         middle = 0.5 * (below + above)
         below, above = (middle, above) if limit_of(system, middle) else (below, middle)
     sides = [ImplicitEuler(system, h=step, solver="gauss_newton") for step in (below, above)]
-    assert [side._solver._iteration_limit > 0 for side in sides] == [True, False]
+    assert [side._solver.product_limit > 0 for side in sides] == [True, False]
     assert_equal_results(*(side.step(state) for side in sides))
 
 
@@ -174,16 +176,27 @@ def test_the_rule_compares_products_with_a_factorisation():
     assert limit_of(system, 1e160) == 0
 
 
-def test_the_factor_is_made_only_without_convergence(monkeypatch, backend):
+def test_the_factor_is_made_only_without_convergence(monkeypatch):
+    """Counted in the interpreter."""
     system, state = cloth()
     integrator, (_, direct) = ImplicitEuler(system, h=h, solver="gauss_newton"), integrators(system)
-    expected, refactorize = direct.step(state).state.positions, CholeskyFactor.refactorize
-    monkeypatch.setattr(CholeskyFactor, "refactorize", None)
-    result = integrator.step(state).state.positions
+    counts, eliminate = [0], gauss_newton.eliminate_fronts
+
+    def counted(*arguments):
+        counts[-1] += 1
+        return eliminate(*arguments)
+
+    monkeypatch.setattr(gauss_newton, "eliminate_fronts", counted)
+    with set_backend("python"):
+        expected = direct.step(state).state.positions
+        counts.append(0)
+        result = integrator.step(state).state.positions
+        counts.append(0)
+        integrator._solver.limit_products(3)
+        fallback = integrator.step(state).state.positions
+    assert counts == [1, 0, 1]
     assert np.abs(result - expected).max() < 1e-14
-    monkeypatch.setattr(CholeskyFactor, "refactorize", refactorize)
-    integrator._solver._iteration_limit = 3
-    np.testing.assert_array_equal(integrator.step(state).state.positions, expected)
+    np.testing.assert_array_equal(fallback, expected)
 
 
 def test_squares_beyond_the_floats_are_left_to_the_factor(backend):
