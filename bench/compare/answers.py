@@ -26,7 +26,7 @@ _ERRORS = frozenset({
     "positions", "rotations", "jacobians", "above",
 })  # fmt: skip
 # In other suites the distance of a target, which is an input.
-_DISTANCES = frozenset({("cloth", "distance"), ("newton", "distance")})
+_DISTANCES = frozenset({("newton", "distance")})
 # Arrays of which larger values are better.
 _MERITS = frozenset({"solved", "holds", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.

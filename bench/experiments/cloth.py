@@ -1,12 +1,12 @@
 """Convergence of implicit Euler's solvers on the lab's cloth, and the error of few iterations."""
 
+import itertools
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from plumbob.crosscheck.mass_spring.exact_step import exact_step
 from plumbob.reference import ImplicitEuler, MassSpring, State
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.mass_spring import damper_forces, lengths, spring_forces
@@ -28,6 +28,7 @@ from ..problems.cloth_swing import (
     motion,
 )
 from ..problems.cloth_truth import rms_distance
+from ..problems.step_minima import minima_of
 
 # The tasks of its records.
 ONE_STEP, FEW, DAMPERS = "one step", "few iterations", "dampers"
@@ -49,13 +50,13 @@ class IterationErrors(StepFacts, frozen=True):
 
     residual: Floats1
     error: Floats1
+    minimum: float = 0.0  # g(x*) relative to Newton's, as in `StepErrors`
 
 
 class TruncatedSteps(StepFacts, frozen=True):
     """Steps of a few iterations compared with converged steps, (step,): relative error, and [m]."""
 
     error: Floats1
-    distance: Floats1
     drift: Floats1
     path: Floats1
 
@@ -102,31 +103,27 @@ def _block(
 def one_step(problem: ClothSwing, solver: str, iterations: int) -> Measured:
     """Iterate a step from mid-swing; keep residual and error after each iteration."""
     state = converged_motion(problem)[MIDDLE]
-    newton = integrator_of(problem, tolerance=0.0, max_iterations=50).step(state).state.positions
-    exact = exact_step(problem.system, state, problem.h, newton)
-    objective = integrator_of(problem).objective(state)
+    minima = minima_of(problem.system, state, problem.h)
     iterates = ImplicitEuler(problem.system, h=problem.h, solver=solver).iterates(state)
-    pairs = [
-        (objective.residual(iterate), exact.error(iterate.positions, objective.y))
-        for _, iterate in zip(range(iterations + 1), iterates, strict=False)
-    ]
-    return dict(zip(("residual", "error"), np.array(pairs).T, strict=True))
+    first = list(itertools.islice(iterates, iterations + 1))
+    residual = np.array([minima.objective.residual(iterate) for iterate in first])
+    errors = minima.measure([iterate.positions for iterate in first])
+    return {"residual": residual, "error": errors.error, "minimum": errors.minimum}
 
 
 def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
     """Compare steps of a few local/global iterations with converged steps.
 
-    The error and distance are measured after a single step from each state of the converged motion.
+    The error is measured after a single step from each state of the converged motion.
     The drift is the distance between the converged motion and a motion of only truncated steps. The
     path is the distance of the converged motion from its start.
     """
     integrator = integrator_of(problem, "local_global", 0.0, iterations)
     start, *exact = converged = converged_motion(problem)[FALLING:]
     ends = [integrator.step(state).state for state in converged[:-1]]
-    inertial = [integrator_of(problem).objective(state).y for state in converged[:-1]]
     errors = [
-        metrics.relative_error(end.positions, x.positions, y)
-        for end, x, y in zip(ends, exact, inertial, strict=True)
+        minima_of(problem.system, state, problem.h).measure([end.positions]).error
+        for state, end in zip(converged, ends, strict=False)
     ]
 
     def distances(states: Sequence[State]) -> FloatArray:
@@ -134,8 +131,7 @@ def few_iterations(problem: ClothSwing, iterations: int) -> Measured:
         return np.array([rms_distance(a.positions, b.positions) for a, b in pairs])
 
     return {
-        "error": np.array(errors),
-        "distance": distances(ends),
+        "error": np.concatenate(errors),
         "drift": distances(motion(start, STEPS, integrator)[1:]),
         "path": distances([start] * STEPS),
     }
@@ -240,7 +236,6 @@ def _cloth(row: SolverRecords) -> str:
 
 _solved = _iterations_to(SOLVED).read
 _trials = _of(ONE_STEP, lambda step: step.error.size - 1)
-
 CONVERGENCE = (
     text("cloth", _cloth),
     text("solver", lambda row: label(row[0].solver)),
@@ -250,6 +245,7 @@ CONVERGENCE = (
     _after("error", 1000, best="least", folded=True),
     *(_iterations_to(d, folded=True) for d in DECADES if d not in ("1e-2", "1e-4")),
     Column("iterations tried", read=_trials, folded=True),
+    Column("g(x*) above Newton’s", read=_of(ONE_STEP, lambda step: step.minimum), folded=True),
     *(_after("residual", count, folded=True) for count in (1, 10, 100, 1000)),
     *(column for count in FEW_ITERATIONS for column in _truncated(count)),
 )

@@ -1,7 +1,7 @@
-"""The same cloth for every solver: steps to the minimiser, motions to the truth, stability.
+"""The same cloth for every solver: steps to a minimiser, motions to the truth, stability.
 
-Each solver runs in a worker process. Its step is compared with the minimiser to 25 digits, its
-motion with the true motion. Every sweep runs every solver with all of its settings, so only the
+Each solver runs in a worker process. Its step is compared with the nearest minimiser to 25 digits,
+its motion with the true motion. Every sweep runs every solver with all of its settings, so only the
 times depend on the machine. Solvers with different sweeps are seen. Solvers that minimise the
 objective of an implicit step stand in both tables, all others only in the table of motions.
 """
@@ -24,18 +24,12 @@ from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import JobOutcome, Message, Ready, Solved, WorkerProcess
 from ..measure.measure import not_installed
 from ..measure.timing import messages_of
-from ..measure.values import Fact, Floats1, Integers1, Values
+from ..measure.values import Booleans1, Fact, Floats1, Integers1, Values
 from ..peers import catalogue
 from ..peers.peer import EXPLICIT, ITERATED, LINEARISED, UNDECLARED, Peer
 from ..peers.protocol import Mover, OwnTime
 from ..problems import published
-from ..problems.cloth_truth import (
-    ClothTruth,
-    first_step,
-    inertial_positions,
-    rms_distance,
-    truth_of,
-)
+from ..problems.cloth_truth import ClothTruth, rms_distance, truth_of
 from ..problems.falling_cloth import (
     FALLING,
     FRAME,
@@ -51,6 +45,7 @@ from ..problems.falling_cloth import (
     own_cloth,
 )
 from ..problems.own import OwnProblem
+from ..problems.step_minima import above_lowest, minima_of
 
 # The tasks of its records.
 ONE_STEP, MOTION = "work of a step", "work of a motion"
@@ -89,6 +84,9 @@ class Work(Values, frozen=True, kw_only=True):
     setup: Floats1  # time to set the solver up [s]
     # |x - x*| / |y - x*| of a step; of a motion, distance from the truth over distance moved
     error: Floats1
+    above: Floats1 | None = None  # excess of g of a step, as in `StepErrors`
+    minimum: Floats1 | None = None  # the same of x*
+    proven: Booleans1 | None = None  # whether x* is proven to be a minimiser
     rounding: Floats1 | None = None  # the error of x* rounded to single precision
     order: Floats1 | None = None  # observed, of the true motion
     frames: Integers1 | None = None  # of the motion; a step is one
@@ -203,9 +201,11 @@ SWEEPS, QUICK_SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 2, 5
 # A solver silent for this long [s] over a frame, or over its set-up, has not finished. No solver
 # takes nearly as long on any machine in use.
 _PATIENCE, _START_PATIENCE = 120.0, 600.0
+# The remark on answers that are measured against positions not proven to be a minimiser.
+UNPROVEN = "x* not proven"
 # What errors are measured against.
 _ARBITERS = {
-    ONE_STEP: "the minimiser to 25 digits, by decimal arithmetic",
+    ONE_STEP: "the nearest known minimiser to 25 digits, by decimal arithmetic",
     MOTION: "Runge-Kutta with steps halved until they agree",
 }
 
@@ -387,61 +387,61 @@ def work(task: str, peer: Peer, falls: Sequence[Fall]) -> Measured:
 
     Keep the time for a frame and the error of the last, infinite if not reached.
     """
-    rows, labels, remarks, troubles = [], [], [], []
+    rows, labels, notes, troubles, errors = [], [], [], [], []
     for fall in falls:
         cloth, (rungs, frames, repeats) = fall.make(), (step_rungs, 1, REPEATS)
         if task == MOTION:
             rungs, frames, repeats = motion_rungs, fall.level.frames, 1
+        answers, nowhere = [], np.full((frames, *cloth.start.positions.shape), np.nan)
         for rung in rungs(peer, cloth.beat):
             outcome = _performed(peer, cloth, rung, Shape(frames, repeats, cloth.frame))
             last = outcome.solved[-frames:]
-            error = _error(task, last, fall) if len(last) == frames else np.inf
+            positions = np.array([frame.q for frame in last])
+            answers.append(positions.reshape(nowhere.shape) if len(last) == frames else nowhere)
             seconds = metrics.spread(np.array([frame.seconds for frame in last])).median
-            rows.append((fall.level.size, seconds, outcome.setup, error))
+            rows.append((fall.level.size, seconds, outcome.setup))
             labels.append(rung.label)
-            remarks.append(outcome.note or ("diverged" if np.isinf(error) else ""))
+            notes.append(outcome.note)
             troubles.append(outcome.trouble)
-    names = ("particles", "seconds", "setup", "error")
+        errors.append(_errors(task, answers, fall))
+    names = ("particles", "seconds", "setup")
+    measured = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
+    measured |= {name: np.concatenate([level[name] for level in errors]) for name in errors[0]}
+    flaws = np.where(
+        np.isinf(measured["error"]),
+        "diverged",
+        np.where(measured.get("proven", True), "", UNPROVEN),
+    )
     return {
-        **dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True)),
+        **measured,
         **_certainty(falls),
         "frames": np.array([fall.level.frames if task == MOTION else 1 for fall in falls]),
         "rungs": labels,
-        "remarks": remarks,
+        "remarks": [note or str(flaw) for note, flaw in zip(notes, flaws, strict=True)],
         "trouble": next(filter(None, troubles), ""),
     }
 
 
-def _error(task: str, frames: Sequence[Solved], fall: Fall) -> float:
-    """Return the error of a step, or of the frames of a motion."""
-    positions = np.array([frame.q for frame in frames]).reshape(-1, *fall.truth.inertial.shape)
+def _errors(task: str, answers: Sequence[FloatArray], fall: Fall) -> dict[str, FloatArray]:
+    """Return the errors of all settings, whose answers are positions frame by frame."""
     if task == MOTION:
-        return motion_error(positions, fall.truth, fall.make().extent)
-    return step_error(positions[-1], fall.truth)
+        extent = fall.make().extent
+        return {"error": np.array([motion_error(x, fall.truth, extent) for x in answers])}
+    errors = fall.truth.first.measure([x[-1] for x in answers])._asdict()
+    return {name: np.broadcast_to(values, len(answers)) for name, values in errors.items()}
 
 
 def _certainty(falls: Sequence[Fall]) -> dict[str, np.ndarray]:
     """Return how sure the arbiters are at each size.
 
-    The rounding is the error of the converged step in single precision.
+    The rounding is the error of Newton's minimum in single precision.
     """
     truths = [fall.truth for fall in falls]
-    rounded = [t.first.positions.astype(np.float32).astype(float) for t in truths]
     return {
-        "rounding": np.array(list(map(step_error, rounded, truths))),
+        "rounding": np.array([truth.first.rounding for truth in truths]),
         "order": np.array([truth.order for truth in truths]),
         "unsure": np.array([truth.unsure for truth in truths]),
     }
-
-
-def step_error(positions: np.ndarray, truth: ClothTruth) -> float:
-    """Return the error of a step over the error of its inertial start y; inf after divergence.
-
-    The error is the distance from converged implicit Euler.
-    """
-    if not np.isfinite(positions).all() or np.abs(positions).max() > 1e100:
-        return np.inf
-    return truth.first.error(positions, truth.inertial)
 
 
 def motion_error(positions: np.ndarray, truth: ClothTruth, extent: float = SIDE) -> float:
@@ -530,8 +530,8 @@ def liu_2013(solver: str) -> Measured:
     if not outcome.solved:
         raise ArithmeticError(outcome.trouble)
     seconds = np.array([step.seconds for step in outcome.solved])
-    exact, inertial = first_step(cloth, frame), inertial_positions(cloth, frame)
-    error = exact.error(outcome.solved[-1].q, inertial)
+    minima = minima_of(cloth.system, cloth.start, frame)
+    (error,) = minima.measure([outcome.solved[-1].q.reshape(cloth.start.positions.shape)]).error
     return {"seconds": seconds, "error": error, "vertices": cloth.system.particle_count}
 
 
@@ -588,6 +588,8 @@ class Point(NamedTuple):
     remark: str  # on this setting, else ""
     error: float  # of a step or a motion; infinite if not reached
     seconds: float  # for a frame
+    above: float = np.nan  # excess of g of a step, as in `StepErrors`
+    minimum: float = 0.0  # the same of x*
     spread: float = 0.0  # largest difference between the errors of two sweeps
     drift: float = 1.0  # the longest of the sweeps' times over the shortest
     sweeps: int = 1
@@ -643,7 +645,9 @@ def _points_of(sweeps: Sequence[Record]) -> Iterator[Point]:
         drift = float(seconds.max() / seconds.min()) if seconds.min() > 0.0 else 1.0
         remark = "".join(first.values.remarks[i : i + 1])
         error, median = float(first.values.error[i]), float(np.median(seconds))
-        yield Point(first, *rung, remark, error, median, spread, drift, len(same))
+        above, minimum = first.values.above, first.values.minimum
+        g = (np.nan, 0.0) if above is None else (float(above[i]), float(minimum[i]))
+        yield Point(first, *rung, remark, error, median, *g, spread, drift, len(same))
 
 
 def motion_length(results: Results) -> str:
@@ -701,6 +705,7 @@ class ClothRow(NamedTuple):
     solver: str
     points: tuple[Point, ...] = ()
     limit: StabilityLimit | None = None
+    minima: tuple[float, ...] = ()  # of the cloth, near to which any solver ends
     missing: str = ""  # why
 
     @property
@@ -712,6 +717,11 @@ class ClothRow(NamedTuple):
     def error(self) -> Cell:
         """The smallest error."""
         return self.best and (self.best.error if self.best.is_whole else "diverged")
+
+    @property
+    def above(self) -> float | None:
+        """The excess of g of that setting over the lowest minimum."""
+        return self.best and number(float(above_lowest(self.best.above, self.minima)))
 
     def cheapest(self, error: float) -> Point | None:
         """Return the cheapest setting with so small an error, None without any."""
@@ -727,6 +737,8 @@ class ClothRow(NamedTuple):
 def _remarks(row: ClothRow) -> Iterator[str]:
     if row.points[0].record.values.kind == LINEARISED and len(row.points) == 1:
         yield "one linearised step"
+    if row.best and (height := float(above_lowest(row.best.minimum, row.minima))):
+        yield f"near a minimum that is not the lowest: g is {words(height)} above"
     for remark, group in grouped(row.points, lambda point: point.remark).items():
         if remark:
             rungs = f"{listed([point.setting for point in group])}: "
@@ -740,9 +752,11 @@ def _rows(
 ) -> Iterator[ClothRow]:
     """Yield a row for each solver on each cloth, and for each missing engine."""
     settings = grouped(points(results, task), lambda point: (point.cloth, point.solver))
+    cloths = grouped(points(results, task), lambda point: point.cloth)
     for (cloth, solver), group in settings.items():
         limit = None if group[0].own else limits.get((solver, group[0].stiffness))
-        yield ClothRow(cloth, solver, tuple(group), limit)
+        minima = tuple(point.minimum for point in cloths[cloth])
+        yield ClothRow(cloth, solver, tuple(group), limit, minima)
     for record in results.all("cloth", task=MISSING):
         yield ClothRow("every cloth", record.solver, missing=record.remark)
 
@@ -758,7 +772,7 @@ def _largest(name: str, row: ClothRow) -> float | None:
     return max((getattr(point, name) for point in row.points), default=None)
 
 
-def _columns(targets: Mapping[str, float], unit: str = "", *stable: Column) -> list[Column]:
+def _columns(targets: Mapping[str, float], unit: str, *further: Column) -> list[Column]:
     """Return the columns of a task: first the time to the last target, which ranks."""
     *times, first = (
         Column(
@@ -770,7 +784,7 @@ def _columns(targets: Mapping[str, float], unit: str = "", *stable: Column) -> l
         text("cloth", lambda row: row.cloth),
         text("solver", lambda row: row.solver),
         *(first, Column("smallest error", unit, best="least", read=lambda row: row.error)),
-        *(*times, *stable[:1], text("remark", lambda row: row.remark)),
+        *(*times, *further[:1], text("remark", lambda row: row.remark)),
         *folded(
             *(
                 text(f"setting for {target}", partial(_of_cheapest, error, "setting"))
@@ -780,7 +794,7 @@ def _columns(targets: Mapping[str, float], unit: str = "", *stable: Column) -> l
         *folded(text("setting for the smallest error", lambda row: row.best and row.best.setting)),
         *folded(Column("slowest over fastest sweep", read=partial(_largest, "drift"))),
         *folded(Column("difference between sweeps", read=partial(_largest, "spread"))),
-        *folded(*stable[1:]),
+        *folded(*further[1:]),
     ]
 
 
@@ -824,6 +838,8 @@ def _summary(title: str, targets: Mapping[str, float], rows: Sequence[ClothRow])
     sentence = f"No solver reaches {target}, {title}."
     if firsts:
         sentence = f"The fastest to {target}, {title}, is {most_often(firsts, 'cloth')}."
+    if several := [cloth for cloth, group in cloths.items() if len(set(group[0].minima)) > 1]:
+        sentence += f" Solvers end near different minima on {listed(several)}."
     return Summary(sentence, tuple(
         f"{cloth}: {listed([f'to {t} {_fastest(group, targets[t])}' for t in targets])}"
         for cloth, group in cloths.items()
@@ -855,7 +871,7 @@ one_step = CAPTIONS.layout(
     "cloth_peers_step",
     partial(_rows, ONE_STEP, {}),
     partial(_summary, "an error of one implicit step", TARGETS),
-    columns=_columns(TARGETS),
+    columns=_columns(TARGETS, "", Column("g above lowest", read=lambda row: row.above)),
     measured=_rounding,
     figures=(step_chart,),
 )

@@ -2,7 +2,7 @@
 
 Where springs are stiff, the residual |grad g(x)| / |grad g(y)| says little about the distance to
 the minimiser. It ignores pins, which are not variables of g. Positions are therefore compared with
-x*, the limit of Newton's method from y, by the error
+x*, the nearest known minimiser (see `minima`), by the error
 
     |x - x*| / |y - x*|,
 
@@ -15,16 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import SMALLEST_POSITIVE, FloatArray, array, coordinates, frozen
-from ..implicit_euler import ImplicitEuler
-from ..implicit_euler.certificate import Certificate
+from ..arguments import FloatArray, array, coordinates, frozen
+from ..implicit_euler.certificate import Certificate, certify
 from ..mass_spring import MassSpring, State
 from ..outcome import Outcome
-
-# The smallest: only rounding stops Newton's method.
-TOLERANCE = SMALLEST_POSITIVE
-# Five times Newton's default: a step that needs more has no x*, and no error.
-MAX_ITERATIONS = 500
+from .minima import Minima
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +29,8 @@ class StepJudgement:
     Attributes:
         error: |x - x*| / |y - x*|; 0 if both distances are 0, infinite if only |y - x*| is, or if
             Newton's method found no x*.
+        excess: (g(x) - g*) / (g(y) - g*), over the free particles, with g* the lowest of the known
+            minima; infinite if only g(y) - g* is 0.
         distance: |x - x*| over all coordinates [m].
         displacement: |y - x*| over all coordinates [m].
         pin_displacement: the largest distance of a pinned particle from its position at the end of
@@ -42,15 +39,19 @@ class StepJudgement:
             velocities.
         residual: |grad g(x)| / max(|grad g(y)|, floor), over the free particles.
         certificate: the certificate of x with the pins at their positions at the end of the step.
-        reference_certificate: the certificate of the end of Newton's method.
-        same_minimiser: whether the minimiser near x is proven to be the minimiser near x* (True) or
-            another minimiser (False); None without a proof of either.
-        minimiser: x*, shape (particle, 3) [m]; without x*, the end of Newton's method.
-        iterations: number of iterations of Newton's method.
-        outcome: the outcome of Newton's method; without `solved` there is no x*.
+        reference_certificate: the certificate of x*.
+        same_minimiser: whether the minimiser near x is proven to be that of Newton's method from y
+            (True) or another minimiser (False); None without a proof of either.
+        minimiser: x*, shape (particle, 3) [m]: the limit of Newton's method from y, or, if proven
+            and nearer to x, its limit from x.
+        is_from_y: whether x* is the limit of Newton's method from y.
+        iterations: number of iterations of Newton's method from y.
+        outcome: the outcome of Newton's method from y; unless `solved`, only a proven limit from x
+            is x*.
     """
 
     error: float
+    excess: float
     distance: float
     displacement: float
     pin_displacement: float
@@ -60,6 +61,7 @@ class StepJudgement:
     reference_certificate: Certificate
     same_minimiser: bool | None
     minimiser: FloatArray
+    is_from_y: bool
     iterations: int
     outcome: Outcome
 
@@ -76,12 +78,13 @@ class StepJudgement:
         return " ".join(sentences)
 
     def _distance(self) -> str:
-        if not self.outcome.solved:
+        if self.distance == math.inf:
             return f"Newton's method found no minimiser to compare with ({self.outcome.name})."
         doubt = "" if self.reference_certificate.covered else ", not proven to be a minimiser"
+        start = "y" if self.is_from_y else "x"
         return (
-            f"The positions are {self.distance:.2g} m from x*, what Newton's method comes to from y"
-            f"{doubt}: {self.error:.2g} times as far as y."
+            f"The positions are {self.distance:.2g} m from x*, what Newton's method comes to from "
+            f"{start}{doubt}: {self.error:.2g} times as far as y."
         )
 
     def _proof(self) -> str:
@@ -89,7 +92,7 @@ class StepJudgement:
             return self.certificate.coverage.sentence
         minimiser = {
             True: "the minimiser near x* lies",
-            False: "another minimiser, as right as that one, lies",
+            False: "another minimiser than from y, as right as that one, lies",
             None: "a minimiser lies",
         }[self.same_minimiser]
         pins = " of them with the pins in place" if self.pin_displacement else ""
@@ -111,20 +114,14 @@ def judge_step(
     without velocities only the positions are judged. The other arguments and the errors are as for
     `ImplicitEuler.step`.
     """
-    integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS)
-    loads = external_forces, pin_positions
-    objective = integrator.objective(state, *loads)
+    minima = Minima(system, state, h, external_forces, pin_positions)
+    objective, newton, solution = minima.objective, minima.newton, minima.solution
     x = coordinates("positions", positions, system.particle_count, 3)
-    solution = integrator.step(state, *loads)
-    best, with_pins = solution.state.positions, np.where(system.free[:, None], x, objective.y)
-    certificate, reference = (
-        integrator.certify(state, points, *loads) for points in (with_pins, best)
-    )
-    between = float(np.linalg.norm(with_pins - best))
+    nearest, with_pins = minima.nearest(x), np.where(system.free[:, None], x, objective.y)
+    certificate = certify(objective, with_pins)
     distance = displacement = error = math.inf
-    if solution.outcome.solved:
-        distance = float(np.linalg.norm(x - best))
-        displacement = float(np.linalg.norm(objective.y - best))
+    if solution.outcome.solved or nearest is not newton:
+        distance, displacement = map(nearest.distance, (x, objective.y))
         if displacement > 0.0 or distance == 0.0:
             error = distance / displacement if distance > 0.0 else 0.0
     velocity_error = None
@@ -133,15 +130,19 @@ def judge_step(
         velocity_error = _largest(v - (x - objective.x_n) / objective.h)
     return StepJudgement(
         error=error,
+        excess=minima.excess(with_pins, minima.lowest),
         distance=distance,
         displacement=displacement,
         pin_displacement=_largest((x - objective.y)[system.pinned]),
         velocity_error=velocity_error,
-        residual=integrator.certify(state, x, *loads).residual,
+        residual=objective.residual(objective.iterate_at(x)),
         certificate=certificate,
-        reference_certificate=reference,
-        same_minimiser=certificate.shares_minimiser_within(reference, between),
-        minimiser=frozen(best),
+        reference_certificate=nearest.certificate,
+        same_minimiser=certificate.shares_minimiser_within(
+            newton.certificate, newton.distance(with_pins)
+        ),
+        minimiser=frozen(nearest.positions),
+        is_from_y=nearest is newton,
         iterations=solution.iterations,
         outcome=solution.outcome,
     )

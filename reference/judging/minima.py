@@ -1,0 +1,116 @@
+"""The known minimisers of a step, against the nearest of which an answer is measured.
+
+Where springs are compressed g may have several minimisers, all of them ends of the step. Two are
+known of an answer x: the limit of Newton's method from y, and its limit from x. The second counts
+only if it is proven to be a minimiser, so an answer far from all minimisers stays far.
+"""
+
+import copy
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..arguments import SMALLEST_POSITIVE, FloatArray
+from ..implicit_euler import STEP_SOLVERS, ImplicitEuler
+from ..implicit_euler.certificate import Certificate, certify
+from ..mass_spring import MassSpring, State
+
+# The smallest: only rounding stops Newton's method.
+TOLERANCE = SMALLEST_POSITIVE
+# Five times Newton's default: a step that needs more has no limit.
+MAX_ITERATIONS = 500
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """A limit of Newton's method: positions, shape (particle, 3) [m], g [kg m²], the proof."""
+
+    positions: FloatArray
+    value: float
+    certificate: Certificate
+
+    def distance(self, x: FloatArray) -> float:
+        """Return the distance of positions over all coordinates [m]."""
+        return float(np.linalg.norm(x - self.positions))
+
+
+class Minima:
+    """The known minimisers of a step.
+
+    Attributes:
+        objective: g of the step.
+        solution: the result of Newton's method from y; the minimum `newton` if it is solved.
+        newton: the limit of Newton's method from y.
+    """
+
+    def __init__(
+        self,
+        system: MassSpring,
+        state: State,
+        h: float,
+        external_forces: ArrayLike | None = None,
+        pin_positions: ArrayLike | None = None,
+    ) -> None:
+        """Run Newton's method from y; arguments and errors are as for `ImplicitEuler.step`."""
+        integrator = ImplicitEuler(system, h=h, tolerance=TOLERANCE, max_iterations=MAX_ITERATIONS)
+        self.objective = integrator.objective(state, external_forces, pin_positions)
+        self.solution = integrator.step(state, external_forces, pin_positions)
+        self.newton = self._minimum(self.solution.state.positions)
+        self._others: list[Minimum] = []
+
+    def nearest(self, x: FloatArray) -> Minimum:
+        """Return the nearer to x of Newton's limits from y and, if proven, from x.
+
+        Other answers asked about before do not change the result.
+        """
+        other = self._limit(x)
+        if other is None or not self.solution.outcome.solved:
+            return other or self.newton
+        return min(self.newton, other, key=lambda minimum: minimum.distance(x))
+
+    @property
+    def lowest(self) -> Minimum:
+        """The minimum with the least g of those known."""
+        newton = [self.newton] if self.solution.outcome.solved or not self._others else []
+        return min(newton + self._others, key=lambda minimum: minimum.value)
+
+    def excess(self, x: FloatArray, base: Minimum) -> float:
+        """Return (g(x) - g*) / (g(y) - g*) with g* at the base."""
+        height = self.objective.inertial.value - base.value
+        above = self.objective.iterate_at(x).value - base.value
+        return above / height if height > 0.0 else 0.0 if above <= 0.0 else math.inf
+
+    def _limit(self, x: FloatArray) -> Minimum | None:
+        """Return the minimum that Newton's method finds from x, None without a proven one."""
+        end = self._newton_from(np.where(self.objective.system.free[:, None], x, self.objective.y))
+        if end is None:
+            return None
+        for known in (self.newton, *self._others):
+            if known.distance(end) <= known.certificate.unique_within:
+                return known
+        limit = self._minimum(end)
+        if not limit.certificate.covered:
+            return None
+        self._others.append(limit)
+        return limit
+
+    @np.errstate(over="ignore", invalid="ignore")
+    def _newton_from(self, x: FloatArray) -> FloatArray | None:
+        """Return the last iterate of Newton's method from x, None if it overflows."""
+        objective = copy.copy(self.objective)
+        objective.start = last = objective.iterate_at(x)
+        newton = STEP_SOLVERS["newton"](objective.system, objective.h)
+        for count, iterate in enumerate(newton.iterates(objective)):
+            if not iterate.finite:
+                return None
+            is_rounding = iterate.at_floor and iterate.gradient_norm >= last.gradient_norm
+            is_stuck = iterate is last or is_rounding
+            if (count and is_stuck) or count == MAX_ITERATIONS:
+                break
+            last = iterate
+        return last.positions
+
+    def _minimum(self, x: FloatArray) -> Minimum:
+        return Minimum(x, self.objective.iterate_at(x).value, certify(self.objective, x))
