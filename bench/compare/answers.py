@@ -25,8 +25,6 @@ _ERRORS = frozenset({
     "residual", "error", "position", "rotation", "beyond", "excess", "drift", "difference",
     "positions", "rotations", "jacobians", "above",
 })  # fmt: skip
-# In other suites the distance of a target, which is an input.
-_DISTANCES = frozenset({("newton", "distance")})
 # Arrays of which larger values are better.
 _MERITS = frozenset({"solved", "holds", "covered", "same"})
 # Which targets were solved; records with this array have times by target too.
@@ -46,7 +44,7 @@ def is_time(suite: str, name: str) -> bool:
 
 def worse_sign(suite: str, name: str) -> int:
     """Return 1 if larger is worse, -1 if larger is better, 0 if neither is known."""
-    if name in _ERRORS or (suite, name) in _DISTANCES:
+    if name in _ERRORS or (suite, name) == ("newton", "distance"):  # elsewhere an input
         return 1
     return -1 if name in _MERITS else 0
 

@@ -78,13 +78,12 @@ class Work(Values, frozen=True, kw_only=True):
     remarks: Fact[tuple[str, ...]] = ()  # on each setting, (rung,)
     kind: Fact[str] = ""  # how the solver's settings differ, see `Run`
     sweep: Fact[int] = 1  # the pass over all solvers in which it was measured
-    arbiter: Fact[str] = ""  # the engine whose answer counts as the truth
     particles: Integers1  # along a side
     seconds: Floats1  # for a frame
     setup: Floats1  # time to set the solver up [s]
     # |x - x*| / |y - x*| of a step; of a motion, distance from the truth over distance moved
     error: Floats1
-    above: Floats1 | None = None  # excess of g of a step, as in `StepErrors`
+    above: Floats1 | None = None  # excess of g of a step, see `StepMinima.measure`
     minimum: Floats1 | None = None  # the same of x*
     proven: Booleans1 | None = None  # whether x* is proven to be a minimiser
     rounding: Floats1 | None = None  # the error of x* rounded to single precision
@@ -203,11 +202,6 @@ SWEEPS, QUICK_SWEEPS, REPEATS, LIU_REPEATS = 3, 2, 2, 5
 _PATIENCE, _START_PATIENCE = 120.0, 600.0
 # The remark on answers that are measured against positions not proven to be a minimiser.
 UNPROVEN = "x* not proven"
-# What errors are measured against.
-_ARBITERS = {
-    ONE_STEP: "the nearest known minimiser to 25 digits, by decimal arithmetic",
-    MOTION: "Runge-Kutta with steps halved until they agree",
-}
 
 # Particles a side of the cloth for the limit of stability.
 STABILITY_SIZE = 6
@@ -312,8 +306,7 @@ def _works(peer: Peer, cloth: _Cloth, sweep: int) -> Iterator[Block]:
     names[MOTION] = "motion"
     for task, name in names.items():
         measure = partial(work, task, peer, cloth.falls)
-        facts = {"kind": peer.run.kind, "arbiter": _ARBITERS[task]}
-        facts |= {"cloth": cloth.name} if cloth.own else {}
+        facts = {"kind": peer.run.kind, **({"cloth": cloth.name} if cloth.own else {})}
         name, more = f"{name}/{cloth.name}", {"size": size, "facts": facts}
         block = _block(task, name, peer.title, measure, settings, **more).of(peer.user_solver)
         yield block.on(cloth.own) if cloth.own else block
@@ -387,7 +380,7 @@ def work(task: str, peer: Peer, falls: Sequence[Fall]) -> Measured:
 
     Keep the time for a frame and the error of the last, infinite if not reached.
     """
-    rows, labels, notes, troubles, errors = [], [], [], [], []
+    rows, errors = [], []
     for fall in falls:
         cloth, (rungs, frames, repeats) = fall.make(), (step_rungs, 1, REPEATS)
         if task == MOTION:
@@ -399,21 +392,18 @@ def work(task: str, peer: Peer, falls: Sequence[Fall]) -> Measured:
             positions = np.array([frame.q for frame in last])
             answers.append(positions.reshape(nowhere.shape) if len(last) == frames else nowhere)
             seconds = metrics.spread(np.array([frame.seconds for frame in last])).median
-            rows.append((fall.level.size, seconds, outcome.setup))
-            labels.append(rung.label)
-            notes.append(outcome.note)
-            troubles.append(outcome.trouble)
+            cost = seconds, outcome.setup
+            rows.append((fall.level.size, *cost, rung.label, outcome.note, outcome.trouble))
         errors.append(_errors(task, answers, fall))
-    names = ("particles", "seconds", "setup")
-    measured = dict(zip(names, map(np.array, zip(*rows, strict=True)), strict=True))
-    measured |= {name: np.concatenate([level[name] for level in errors]) for name in errors[0]}
-    flaws = np.where(
-        np.isinf(measured["error"]),
-        "diverged",
-        np.where(measured.get("proven", True), "", UNPROVEN),
-    )
+    particles, times, setups, labels, notes, troubles = map(list, zip(*rows, strict=True))
+    measured = {name: np.concatenate([level[name] for level in errors]) for name in errors[0]}
+    proven = measured.get("proven", True)
+    flaws = np.where(np.isinf(measured["error"]), "diverged", np.where(proven, "", UNPROVEN))
     return {
         **measured,
+        "particles": np.array(particles),
+        "seconds": np.array(times),
+        "setup": np.array(setups),
         **_certainty(falls),
         "frames": np.array([fall.level.frames if task == MOTION else 1 for fall in falls]),
         "rungs": labels,
@@ -427,8 +417,7 @@ def _errors(task: str, answers: Sequence[FloatArray], fall: Fall) -> dict[str, F
     if task == MOTION:
         extent = fall.make().extent
         return {"error": np.array([motion_error(x, fall.truth, extent) for x in answers])}
-    errors = fall.truth.first.measure([x[-1] for x in answers])._asdict()
-    return {name: np.broadcast_to(values, len(answers)) for name, values in errors.items()}
+    return fall.truth.first.measure([x[-1] for x in answers])
 
 
 def _certainty(falls: Sequence[Fall]) -> dict[str, np.ndarray]:
@@ -531,7 +520,8 @@ def liu_2013(solver: str) -> Measured:
         raise ArithmeticError(outcome.trouble)
     seconds = np.array([step.seconds for step in outcome.solved])
     minima = minima_of(cloth.system, cloth.start, frame)
-    (error,) = minima.measure([outcome.solved[-1].q.reshape(cloth.start.positions.shape)]).error
+    end = outcome.solved[-1].q.reshape(cloth.start.positions.shape)
+    (error,) = minima.measure([end])["error"]
     return {"seconds": seconds, "error": error, "vertices": cloth.system.particle_count}
 
 
@@ -588,7 +578,7 @@ class Point(NamedTuple):
     remark: str  # on this setting, else ""
     error: float  # of a step or a motion; infinite if not reached
     seconds: float  # for a frame
-    above: float = np.nan  # excess of g of a step, as in `StepErrors`
+    above: float = np.nan  # excess of g of a step, see `StepMinima.measure`
     minimum: float = 0.0  # the same of x*
     spread: float = 0.0  # largest difference between the errors of two sweeps
     drift: float = 1.0  # the longest of the sweeps' times over the shortest
@@ -718,11 +708,6 @@ class ClothRow(NamedTuple):
         """The smallest error."""
         return self.best and (self.best.error if self.best.is_whole else "diverged")
 
-    @property
-    def above(self) -> float | None:
-        """The excess of g of that setting over the lowest minimum."""
-        return self.best and number(float(above_lowest(self.best.above, self.minima)))
-
     def cheapest(self, error: float) -> Point | None:
         """Return the cheapest setting with so small an error, None without any."""
         near = [point for point in self.points if point.error <= error]
@@ -737,7 +722,7 @@ class ClothRow(NamedTuple):
 def _remarks(row: ClothRow) -> Iterator[str]:
     if row.points[0].record.values.kind == LINEARISED and len(row.points) == 1:
         yield "one linearised step"
-    if row.best and (height := float(above_lowest(row.best.minimum, row.minima))):
+    if row.best and (height := above_lowest(row.best.minimum, row.minima)):
         yield f"near a minimum that is not the lowest: g is {words(height)} above"
     for remark, group in grouped(row.points, lambda point: point.remark).items():
         if remark:
@@ -765,6 +750,11 @@ def _of_cheapest(error: float, name: str, row: ClothRow) -> Cell:
     """Return an attribute of the cheapest setting with so small an error, None without any."""
     cheapest = row.cheapest(error)
     return cheapest and getattr(cheapest, name)
+
+
+def _above(row: ClothRow) -> Cell:
+    """Return g of the setting with the smallest error above the lowest minimum."""
+    return row.best and number(above_lowest(row.best.above, row.minima))
 
 
 def _largest(name: str, row: ClothRow) -> float | None:
@@ -871,7 +861,7 @@ one_step = CAPTIONS.layout(
     "cloth_peers_step",
     partial(_rows, ONE_STEP, {}),
     partial(_summary, "an error of one implicit step", TARGETS),
-    columns=_columns(TARGETS, "", Column("g above lowest", read=lambda row: row.above)),
+    columns=_columns(TARGETS, "", Column("g above lowest", read=_above)),
     measured=_rounding,
     figures=(step_chart,),
 )

@@ -29,8 +29,6 @@ USUAL, SLOW = 10, 1000
 # perturbed by about `PERTURBATION` [m].
 STIFF, PERTURBATION = 1e5, 1e-6
 FROM_Y, NEAR_NEWTON = "y", "beside Newton’s answer"
-# The numbers of a certificate on record.
-_CERTIFIED = ("residual", "distance", "covered")
 # Particles a side, and the number of random targets of a full scale.
 QUICK, FULL, _FULL_TARGETS = 10, 30, 2000
 
@@ -42,7 +40,6 @@ class CertifiedStep(Values, frozen=True, kw_only=True):
     tolerance: Fact[float]
     start: Fact[str]
     coverage: Fact[str] = ""  # the kind of bound
-    why: Fact[str] = ""  # the sentence of the bound
     size: int  # particles along a side
     iterations: int
     residual: float
@@ -50,7 +47,7 @@ class CertifiedStep(Values, frozen=True, kw_only=True):
     balance: float  # the residual in MuJoCo's forces
     distance: float  # proven bound on the distance to a minimiser, infinite if there is none
     error: float  # |x - x*| / |y - x*|
-    above: float  # g above that of Newton's solution [kg m²]
+    above: float  # g above Newton's limit, see `StepMinima.measure`
     covered: bool  # whether there is a bound
     same: bool  # whether it provably belongs to Newton's minimiser
     different: bool  # whether it provably does not
@@ -96,21 +93,20 @@ def certified_step(size: int, stiffness: float, solver: str, start: str, limit: 
     minima = minima_of(problem.system, problem.start, problem.h)
     solve = _solve_from_y if start == FROM_Y else _solve_near_newton
     x, iterations = solve(problem, solver, limit)
-    errors, certificate = minima.measure([x]), certify(minima.objective, x)
-    newton = minima.newton
+    newton, certificate = minima.newton, certify(minima.objective, x)
+    measured = minima.measure([x])
     same = certificate.shares_minimiser(newton.certificate, newton.distance(x))
     return {
         "size": size,
         "iterations": iterations,
-        **{name: getattr(certificate, name) for name in _CERTIFIED},
-        "error": errors.error[0],
-        "above": errors.above[0],
+        **{name: getattr(certificate, name) for name in ("residual", "distance", "covered")},
+        "error": measured["error"][0],
+        "above": measured["above"][0],
         "at_floor": minima.objective.iterate_at(x).at_floor,
         "balance": balance_residual(problem.system, problem.start, x, problem.h),
         "same": same is True,
         "different": same is False,
         "coverage": certificate.coverage.name,
-        "why": certificate.coverage.sentence,
     }
 
 

@@ -296,11 +296,6 @@ def excess(residual: Floats, distance: Floats, reach: float) -> Floats:
     return residual - np.maximum(distance - reach, 0.0)
 
 
-def relative_error(x: Floats, exact: Floats, start: Floats) -> float:
-    """Return |x - exact| / |start - exact|."""
-    return float(np.linalg.norm(x - exact) / np.linalg.norm(start - exact))
-
-
 def ratio(a: float, b: float) -> float:
     """Return a / b; NaN where b is zero."""
     return a / b if b else math.nan

@@ -7,31 +7,16 @@ nearest to the last of them; `Minima` says which minima are known of an answer.
 import functools
 import itertools
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from plumbob.crosscheck.mass_spring.exact_step import exact_step
 from plumbob.reference import MassSpring, State
 from plumbob.reference.arguments import LARGEST_COORDINATE, FloatArray
 from plumbob.reference.judging.minima import Minima
 
-# An excess of g below this value is rounding: g is rounded to 1e-16, and y up to some 1,000 times
-# less above a minimum.
+# Smaller shares of the fall of g are rounding: g, rounded by 1e-16 of itself, falls by over 1e-3.
 ROUNDING = 1e-12
-
-
-class StepErrors(NamedTuple):
-    """Errors of answers, (answer,), beside a minimum x*; infinite after divergence.
-
-    Excesses of g are above the limit x_N of Newton's method from y, over the same of y.
-    """
-
-    error: FloatArray  # |x − x*| / |y − x*|
-    above: FloatArray  # (g(x) − g(x_N)) / (g(y) − g(x_N))
-    minimum: float  # the same of x*, 0 of x_N
-    proven: bool  # whether x* is proven to be a minimum
 
 
 class StepMinima(Minima):
@@ -50,8 +35,12 @@ class StepMinima(Minima):
         rounded = self.newton.positions.astype(np.float32).astype(float)
         return self.exact(self.newton).error(rounded, self.objective.y)
 
-    def measure(self, answers: Sequence[FloatArray]) -> StepErrors:
-        """Measure the answers of a solver, each (particle, 3) [m], the most accurate last."""
+    def measure(self, answers: Sequence[FloatArray]) -> dict[str, FloatArray]:
+        """Return errors of a solver's answers, each (particle, 3) [m], the most accurate last.
+
+        The arrays (answer,) are "error", |x − x*| / |y − x*|, infinite after divergence; "above",
+        (g(x) − g(x_N)) / (g(y) − g(x_N)); "minimum", the same of x*; and whether x* is "proven".
+        """
         finite = [bool(np.abs(x).max() <= LARGEST_COORDINATE) for x in answers]
         known = list(itertools.compress(answers, finite))
         minimum = self.nearest(known[-1]) if known else self.newton
@@ -59,18 +48,17 @@ class StepMinima(Minima):
         error, above = np.full((2, len(answers)), np.inf)
         error[finite] = [exact.error(x, y) for x in known]
         above[finite] = [self.excess(x, self.newton) for x in known]
-        height = self.excess(minimum.positions, self.newton)
-        return StepErrors(error, above, height, minimum.certificate.covered)
+        above[np.abs(above) < ROUNDING] = 0.0
+        height = np.full(len(answers), self.excess(minimum.positions, self.newton))
+        proven = np.full(len(answers), minimum.certificate.covered)
+        return {"error": error, "above": above, "minimum": height, "proven": proven}
 
 
 minima_of = functools.cache(StepMinima)
 
 
-def above_lowest(values: ArrayLike, minima: Sequence[float]) -> FloatArray:
-    """Return excesses of g relative to the lowest of several minima and Newton's, rounding as 0.
-
-    Values and minima are excesses relative to Newton's, as in `StepErrors`.
-    """
+def above_lowest(value: float, minima: Sequence[float]) -> float:
+    """Return g above the lowest of minima and Newton's, for g as `StepMinima.measure` has it."""
     lowest = min(0.0, *minima)
-    excess = (np.asarray(values) - lowest) / (1.0 - lowest)
-    return np.where(excess < ROUNDING, 0.0, excess)
+    above = (value - lowest) / (1.0 - lowest)
+    return 0.0 if above < ROUNDING else above

@@ -24,7 +24,7 @@ from plumbob.bench.measure.isolation import JobOutcome
 from plumbob.bench.peers import catalogue
 from plumbob.bench.peers.peer import EXPLICIT, LINEARISED, Peer, Run
 from plumbob.bench.problems import cloth_truth as truth
-from plumbob.bench.problems.cloth_truth import first_step, rms_distance, true_motion, truth_of
+from plumbob.bench.problems.cloth_truth import rms_distance, true_motion, truth_of
 from plumbob.bench.problems.falling_cloth import (
     FRAME,
     MASS,
@@ -35,6 +35,7 @@ from plumbob.bench.problems.falling_cloth import (
     highest_mode,
     level_cloth,
 )
+from plumbob.bench.problems.step_minima import StepMinima
 from plumbob.bench.tables.results import Results
 from plumbob.bench.tables.table import best_cells
 from plumbob.reference import ImplicitEuler, MassSpring, State, symplectic_euler
@@ -149,24 +150,14 @@ def test_the_converged_step_is_that_of_another_solver(cloth, monkeypatch):
         cloth.system, h=FRAME, solver="lbfgs", tolerance=1e-12, max_iterations=2000
     )
     after = integrator.step(cloth.start).state.positions
-    np.testing.assert_allclose(first_step(cloth).positions, after, atol=1e-9)
-    monkeypatch.setattr(truth, "MAX_ITERATIONS", 1)
+    minima = StepMinima(cloth.system, cloth.start, FRAME)
+    np.testing.assert_allclose(minima.newton.positions, after, atol=1e-9)
+    monkeypatch.setattr("plumbob.reference.judging.minima.MAX_ITERATIONS", 1)
     with pytest.raises(ArithmeticError, match="ended the step as ITERATION_LIMIT"):
-        first_step(cloth)
+        StepMinima(cloth.system, cloth.start, FRAME)
 
 
 # The errors.
-
-
-@pytest.mark.slow
-def test_the_error_of_a_step_is_zero_at_the_answer_one_at_the_start_and_infinite_beyond():
-    answers = truth_of(falling_cloth(SIZE, STIFFNESS), 1)
-    half = 0.5 * (answers.first.positions + answers.inertial)
-    assert peers_cloth.step_error(answers.first.positions, answers) < 1e-14
-    assert peers_cloth.step_error(answers.inertial, answers) == 1.0
-    assert peers_cloth.step_error(half, answers) == pytest.approx(0.5)
-    for lost in (np.nan, np.inf, 1e200):
-        assert peers_cloth.step_error(np.full_like(half, lost), answers) == np.inf
 
 
 @pytest.mark.slow
@@ -248,7 +239,7 @@ def test_whoever_iterates_towards_implicit_euler_gets_nearer(peer, cloth):
     many = 200 if "Newton engine" in peer.title else 1000
     if "XPBD" in peer.title:
         cloth = one_spring()
-    exact = first_step(cloth).positions
+    exact = StepMinima(cloth.system, cloth.start, FRAME).newton.positions
     ends = moved(peer, cloth, iterations=many)
     assert rms_distance(ends, exact) < 20 * PRECISION[peer.engine] + 1e-9
 
@@ -501,6 +492,17 @@ def test_the_table_of_one_step_ranks_by_time_to_the_criterion_then_by_error(make
     (point,) = table.summary.points
     assert point.endswith("to 1e-4 Plumbob Newton, 10.0 ms (then Newton engine, VBD, 500 ms)")
     assert "already an error of 9.0e-6;" in table.measured
+
+
+def test_of_two_minima_the_lower_is_named_and_both_are_right(make):
+    lower = {"above": [0.1, -0.25], "minimum": [-0.25, -0.25], "proven": [True, True]}
+    higher = {"above": [0.5, 0.0], "minimum": [0.0, 0.0], "proven": [True, True]}
+    records = [make.worked("a").with_measured(**lower), make.worked("b").with_measured(**higher)]
+    table = peers_cloth.one_step(Results(records))
+    assert column(table, "g above lowest") == pytest.approx([0.0, 0.2])
+    remarks = column(table, "remark")
+    assert ["near a minimum that is not the lowest: g is 0.200" in r for r in remarks] == [0, 1]
+    assert "near different minima on 20 × 20, 1,000 N/m." in table.summary.sentence
 
 
 def test_sweeps_are_joined_and_their_differences_reported(make):

@@ -30,8 +30,6 @@ def test_closed_forms():
     assert isinstance(metrics.whole(np.array([1, 2]))[2], int)
     excess = metrics.excess(np.array([1.0, 0.25]), np.array([2.5, 1.0]), 2.0)
     np.testing.assert_array_equal(excess, [0.5, 0.25])
-    x, exact, start = np.array([[1.0, 0]]), np.array([[0.0, 0]]), np.array([[0.0, 4]])
-    assert metrics.relative_error(x, exact, start) == 0.25
     points = np.array([[3.0, 4, 0], [0, 0, 0]])
     assert rms_distance(points, np.zeros((2, 3))) == pytest.approx(math.sqrt(12.5))
     assert metrics.first_below(np.array([1.0, 0.1, 0.2, 0.01]), 0.1) == 1

@@ -37,19 +37,17 @@ def test_newton_reaches_the_tolerance_and_is_covered(stiff):
     "key", [("lbfgs", suite.FROM_Y, 2000), ("local_global", suite.NEAR_NEWTON, 500)]
 )
 def test_the_limits_of_other_solvers_are_newtons_where_both_are_covered(stiff, key):
-    arrays, newton = stiff[key], stiff["newton", suite.FROM_Y, 100]
-    assert is_certified(arrays)
-    assert 0 < arrays["newton_distance"] <= arrays["distance"] + newton["distance"]
+    assert is_certified(stiff[key])
+    assert 0 < stiff[key]["error"] < 1e-4
+    assert abs(stiff[key]["above"]) < 1e-9
 
 
 def test_an_answer_far_from_the_limit_has_no_bound_but_an_error(stiff):
-    measured = stiff["local_global", suite.FROM_Y, 3]
-    arrays = notes = measured
+    arrays = stiff["local_global", suite.FROM_Y, 3]
     assert not any(arrays[name] for name in ("covered", "same", "different"))
     assert arrays["distance"] == np.inf
     assert arrays["error"] > 0.1
     assert arrays["above"] > 0
-    assert notes["why"].startswith("No bound")
 
 
 def test_table_and_sentence_follow_the_records(make, stiff):

@@ -207,9 +207,9 @@ def _excused(context: StepContext) -> Verdict:
         return Verdict.UNDECIDED
     if model.integrator.method == "converged" and (model.substeps, model.scaling) == (1, Scaling()):
         judgement = context.judgement
-    if judgement is None or not judgement.certificate.covered:
+    if judgement is None or not judgement.reference_certificate.covered:
         return Verdict.WRONG
-    is_near = judgement.certificate.distance <= IMPRECISE * judgement.displacement
+    is_near = judgement.distance <= IMPRECISE * judgement.displacement
     return Verdict.RIGHT if is_near else Verdict.WRONG
 
 
@@ -221,18 +221,17 @@ def is_indefinite(p: SpringProblem) -> bool:
 
 
 def minimiser(context: StepContext) -> Finding | None:
-    """Return how far positions are from converged implicit Euler, relative to how far y is."""
+    """Return how far positions are from the nearest minimiser, relative to how far y is."""
     p = context.problem
     is_meant = "positions" in context.answers and not context.method_declared
     judgement = context.judgement if is_meant else None
     if judgement is None or not judgement.outcome.solved:
         return None
     rounded = judgement.distance <= context.allowed.positions * np.sqrt(3.0 * p.count)
-    is_right = rounded or judgement.same_minimiser is False
     return finding(
         "minimiser" if context.recognised else "minimiser, of an unknown step",
         judgement.error, SOLVED,
-        verdict=Verdict.RIGHT if is_right else None, distance=judgement.distance,
+        verdict=Verdict.RIGHT if rounded else None, distance=judgement.distance,
     )  # fmt: skip
 
 

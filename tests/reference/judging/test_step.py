@@ -127,28 +127,39 @@ def newton_from(system, state, x):
     return next(itertools.islice(iterates, 50, None)).positions
 
 
-def test_another_minimiser_is_recognised(buckled):
+def test_an_answer_is_measured_against_the_nearest_minimiser(buckled):
+    """Above and below the pins a minimiser is right; g and the summary tell them apart."""
     system, state = buckled(0.1)
-    other = newton_from(system, state, state.positions * [1, -4, 1])
-    found = judge_step(system, state, 1.0, other)
-    assert found.minimiser[0, 1] > 0.1 > -0.1 > other[0, 1]
-    assert found.error > 1
-    assert found.certificate.covered
-    assert found.certificate.distance < 1e-9
-    assert found.same_minimiser is False
-    assert "another minimiser, as right as that one" in found.summary
+    ends = [newton_from(system, state, state.positions * [1, sign, 1]) for sign in (1, -4)]
+    assert ends[0][0, 1] > 0.1 > -0.1 > ends[1][0, 1]
+    above, below = (judge_step(system, state, 1.0, x) for x in ends)
+    for found in (above, below):
+        assert found.error < 1e-14
+        assert found.reference_certificate.covered
+        assert found.certificate.distance < 1e-9
+    assert (above.is_from_y, above.same_minimiser) == (True, True)
+    assert (below.is_from_y, below.same_minimiser) == (False, False)
+    assert "another minimiser than from y, as right as that one" in below.summary
+    objective = ImplicitEuler(system, h=1.0).objective(state)
+    low, high, start = map(objective.value, (*ends, state.positions))
+    assert below.excess == pytest.approx((high - low) / (start - low), rel=1e-9)
+    assert above.excess == pytest.approx(0.0, abs=1e-15)
+    beside = judge_step(system, state, 1.0, ends[1] + 0.1 * (state.positions - ends[1]))
+    assert beside.error == pytest.approx(0.1)
 
 
 def test_a_saddle_that_newton_comes_to_is_not_called_a_minimiser(buckled):
-    """y is one, and its gradient is zero. Beside it the other answer is still proven."""
+    """y is one, and its gradient is zero. The limit from another answer is still proven."""
     system, state = buckled(0.0)
+    saddle = judge_step(system, state, 1.0, state.positions)
+    assert not saddle.reference_certificate.covered
+    assert saddle.outcome is Outcome.SADDLE
+    assert saddle.error == math.inf
+    assert "found no minimiser to compare with (SADDLE)" in saddle.summary
     found = judge_step(system, state, 1.0, newton_from(system, state, buckled(0.1)[1].positions))
-    assert not found.reference_certificate.covered
+    assert found.error < 1e-14
     assert found.certificate.covered
     assert found.same_minimiser is None
-    assert found.outcome is Outcome.SADDLE
-    assert found.error == math.inf
-    assert "found no minimiser to compare with (SADDLE)" in found.summary
     assert "Proven: a minimiser lies within" in found.summary
 
 
