@@ -41,8 +41,9 @@ class Minima:
 
     Attributes:
         objective: g of the step.
-        solution: the result of Newton's method from y; the minimum `newton` if it is solved.
-        newton: the limit of Newton's method from y.
+        solution: the result of Newton's method from y.
+        newton: its limit, which is a minimum if it is solved.
+        known: the minima known so far.
     """
 
     def __init__(
@@ -58,23 +59,21 @@ class Minima:
         self.objective = integrator.objective(state, external_forces, pin_positions)
         self.solution = integrator.step(state, external_forces, pin_positions)
         self.newton = self._minimum(self.solution.state.positions)
-        self._others: list[Minimum] = []
+        self.known = [self.newton] if self.solution.outcome.solved else []
 
     def nearest(self, x: FloatArray) -> Minimum:
         """Return the nearer to x of Newton's limits from y and, if proven, from x.
 
         Other answers asked about before do not change the result.
         """
-        other = self._limit(x)
-        if other is None or not self.solution.outcome.solved:
-            return other or self.newton
-        return min(self.newton, other, key=lambda minimum: minimum.distance(x))
+        limit = self._limit(x) or self.newton
+        newton = self.newton if self.solution.outcome.solved else limit
+        return min(newton, limit, key=lambda minimum: minimum.distance(x))
 
     @property
     def lowest(self) -> Minimum:
         """The minimum with the least g of those known."""
-        newton = [self.newton] if self.solution.outcome.solved or not self._others else []
-        return min(newton + self._others, key=lambda minimum: minimum.value)
+        return min(self.known or [self.newton], key=lambda minimum: minimum.value)
 
     def excess(self, x: FloatArray, base: Minimum) -> float:
         """Return (g(x) - g*) / (g(y) - g*) with g* at the base."""
@@ -87,13 +86,13 @@ class Minima:
         end = self._newton_from(np.where(self.objective.system.free[:, None], x, self.objective.y))
         if end is None:
             return None
-        for known in (self.newton, *self._others):
-            if known.distance(end) <= known.certificate.unique_within:
-                return known
+        for minimum in self.known:
+            if minimum.distance(end) <= minimum.certificate.unique_within:
+                return minimum
         limit = self._minimum(end)
         if not limit.certificate.covered:
             return None
-        self._others.append(limit)
+        self.known.append(limit)
         return limit
 
     @np.errstate(over="ignore", invalid="ignore")
@@ -106,8 +105,7 @@ class Minima:
             if not iterate.finite:
                 return None
             is_rounding = iterate.at_floor and iterate.gradient_norm >= last.gradient_norm
-            is_stuck = iterate is last or is_rounding
-            if (count and is_stuck) or count == MAX_ITERATIONS:
+            if count and (is_rounding or iterate is last or count == MAX_ITERATIONS):
                 break
             last = iterate
         return last.positions

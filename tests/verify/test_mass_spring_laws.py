@@ -7,6 +7,7 @@ shows only here.
 import numpy as np
 import pytest
 
+from plumbob.reference.judging.minima import Minima
 from plumbob.text.sentence import sentence
 from plumbob.verify.case import Case
 from plumbob.verify.exchange import Answer, Exchange
@@ -16,7 +17,7 @@ from plumbob.verify.laws import equal_answers
 from plumbob.verify.mass_spring import laws
 from plumbob.verify.mass_spring.laws import IMPRECISE, SOLVED, StepContext, rounding
 from plumbob.verify.mass_spring.model import Integrator, Scaling, StepModel, predicted
-from plumbob.verify.mass_spring.problem import problem_of
+from plumbob.verify.mass_spring.problem import problem_of, state_of, system_of
 
 pytestmark = pytest.mark.usefixtures("verdict_alone")
 
@@ -42,6 +43,25 @@ def triangle(pinned=()):
             "h": 0.02,
         }
     )
+
+
+def buckled():
+    """A particle pressed between two pins, held in a plane by two more: it buckles up or down."""
+    pins = [[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0], [0.0, 0.0, -2.0], [0.0, 0.0, 2.0]]
+    return problem_of({
+        "masses": np.ones(5), "springs": [[0, i] for i in range(1, 5)], "dampings": np.zeros(4),
+        "rest_lengths": [1.0, 1.0, 0.5, 0.5], "stiffnesses": [100.0, 100.0, 60.0, 60.0],
+        "pinned": [1, 2, 3, 4], "gravity": np.zeros(3), "h": 1.0,
+        "positions": [[0.0, 0.1, 0.0], *pins], "velocities": np.zeros((5, 3)),
+    })  # fmt: skip
+
+
+def beside_another_minimum(p, share):
+    """The change to the minimum beyond the pins, and on from there by a share of the step."""
+    x = predicted(p, CONVERGED)["positions"]
+    other = Minima(system_of(p), state_of(p), p.h).nearest(x * [1.0, -1.0, 1.0]).positions
+    assert other[0, 1] < -0.1
+    return other - x + share * (p.positions - other)
 
 
 def judged(law, p, model=LINEARISED, pins="eliminated", known=True, **changes):
@@ -133,6 +153,14 @@ EDGES = {
         laws.minimiser, triangle(), {"model": CONVERGED},
         lambda p, share: {"positions": one_moved(1, share * displacement(p, CONVERGED))},
         [(0.0, RIGHT), (0.5 * SOLVED, RIGHT), (0.01, RIGHT_EXCEPT)]),
+    "another minimum is as right, and beside it an answer is as wrong": (
+        laws.minimiser, buckled(), {"model": CONVERGED},
+        lambda p, share: {"positions": beside_another_minimum(p, share)},
+        [(0.0, RIGHT), (1e-4, RIGHT_EXCEPT)]),
+    "a declared step may end at another minimum, not beside it": (
+        laws.declared_step, buckled(), {"model": CONVERGED},
+        lambda p, share: {"positions": beside_another_minimum(p, share)},
+        [(0.0, RIGHT), (0.5 * IMPRECISE, RIGHT), (0.01, WRONG)]),
     "nobody can tell of an unknown step": (
         laws.minimiser, triangle(), {"model": CONVERGED, "known": False},
         lambda p, share: {"positions": one_moved(1, share * displacement(p, CONVERGED))},
