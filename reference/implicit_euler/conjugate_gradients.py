@@ -12,11 +12,12 @@ sum. Neither bound depends on positions.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy import uint64 as at
 
-from ..backend.compiled import relaxed
+from ..backend.compiled import relaxed, uncounted
 from ..backend.simd.vectors import dot_rows, load_row, store_row, subtract_scaled
 from ..mass_spring import MassSpring, is_slack, spring_frame
 from ..quaternion import add, load_vector, scale, store_vector
@@ -58,18 +59,34 @@ def iteration_bound(system: MassSpring, h: float) -> float:
     return 0.5 * root * math.log(2.0 * root / TOLERANCE)
 
 
-@relaxed
-def linearised_step(x, gradient, h, masses, springs, elastic, pinned, limit):
-    """Solve for a gradient, zero at the pins, with springs linearised at x.
+class ProductRoom(NamedTuple):
+    """What conjugate gradients write to; the fourth numbers of rows stay zero."""
 
-    `elastic` holds rest lengths, stiffnesses and tension_only. Return the solution, shape
-    (particle, 3), and whether it came within the tolerance in so many iterations.
+    rows: np.ndarray  # two of four numbers for each spring
+    diagonals: np.ndarray  # (particle, 3)
+    lower: np.ndarray  # (particle, 3)
+    vectors: np.ndarray  # residual, solution, direction and product, (4, particle, 4)
+
+
+def product_room(particles, springs):
+    """Return room for so many particles and springs."""
+    blocks = np.empty((particles, 3)), np.empty((particles, 3))
+    return ProductRoom(np.zeros((2 * springs, 4)), *blocks, np.zeros((4, particles, 4)))
+
+
+@relaxed
+@uncounted
+def linearised_step(start, terms, limit, room, step):
+    """Fill in the step to the minimum of g with the springs linearised where they start.
+
+    `start` is of positions and the gradient, zero at the pins. Return whether the step came within
+    the tolerance in so many iterations.
     """
-    n, rows = len(x), np.zeros((2 * len(springs), 4))
-    diagonals, lower, correction = np.empty((n, 3)), np.zeros((n, 3)), np.empty((n, 3))
-    residual, solution = np.zeros((n, 4)), np.zeros((n, 4))
+    (x, gradient), (rows, diagonals, lower, vectors) = start, room
+    h, _, (_, _, masses), springs, elastic, pinned = terms
+    residual, solution = vectors[0], vectors[1]
     add_blocks(x, h * h, masses, springs, elastic, pinned, rows, diagonals, lower)
-    for i in range(n):
+    for i in range(len(x)):
         factorize_block(diagonals, lower, i)
         store_vector(residual, i, eliminate(diagonals, lower, i, load_vector(gradient, i)))
     for s in range(len(springs)):
@@ -77,10 +94,11 @@ def linearised_step(x, gradient, h, masses, springs, elastic, pinned, limit):
             row = at(2 * s + end)
             a = eliminate(diagonals, lower, at(springs[s, end]), load_vector(rows, row))
             store_vector(rows, row, a)
-    converged = conjugate_gradients(springs, rows, limit, residual, solution)
-    for i in range(n):
-        store_vector(correction, i, substitute(diagonals, lower, i, load_vector(solution, i)))
-    return correction, converged
+    converged = conjugate_gradients(springs, rows, limit, vectors)
+    for i in range(len(x)):
+        correction = substitute(diagonals, lower, i, load_vector(solution, i))
+        store_vector(step, i, scale(-1.0, correction))
+    return converged
 
 
 def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
@@ -91,6 +109,7 @@ def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
     rest_lengths, stiffnesses, tension_only = elastic
     for i in range(len(x)):
         store_vector(diagonals, i, (masses[i], masses[i], masses[i]))
+        store_vector(lower, i, (0.0, 0.0, 0.0))
     for i in pinned:
         store_vector(diagonals, i, (math.inf, math.inf, math.inf))
     for s in range(len(springs)):
@@ -133,19 +152,21 @@ def substitute(inverses, lower, i, v):
     return p * (v[0] - yx * y - zx * z), y, z
 
 
-def conjugate_gradients(springs, rows, limit, residual, solution):
+@uncounted
+def conjugate_gradients(springs, rows, limit, vectors):
     """Solve the scaled system from zero (Hestenes and Stiefel 1952); see `linearised_step`."""
-    z, r = solution.reshape(solution.size), residual.reshape(residual.size)
+    size = vectors[0].size
+    r, z = vectors[0].reshape(size), vectors[1].reshape(size)
+    p, q = vectors[2].reshape(size), vectors[3].reshape(size)
     length = math.sqrt(inner(r, r))
     if not 0.0 < length < math.inf:
         return False
     for k in range(len(r)):
         r[k] /= length  # no number below leaves the floats
-    direction, product = residual.copy(), np.empty(residual.shape)
-    p, q = direction.reshape(direction.size), product.reshape(product.size)
+        z[k], p[k] = 0.0, r[k]
     size = inner(r, r)
     for _ in range(limit):
-        multiply(springs, rows, direction, product)
+        multiply(springs, rows, vectors[2], vectors[3])
         step, before = size / inner(p, q), size
         for k in range(len(r)):
             z[k] += step * p[k]

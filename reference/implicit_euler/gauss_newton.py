@@ -18,6 +18,7 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring
+from ..quaternion import add, load_vector, store_vector
 from ..sparse.multifrontal import eliminate_fronts
 from .conjugate_gradients import iteration_limit, linearised_step
 from .factor_cache import hessian_factor
@@ -81,24 +82,18 @@ def gauss_newton_iteration(model, buffers, start, terms, number):
 
     There is no end where the matrix is singular to rounding: the masses vanish beside h² k.
     """
-    (x, gradient, value), end = start, buffers.end
-    h, _, (_, _, masses), springs, elastic, pinned = terms
-    converged = False
-    if model.product_limit > 0:
-        arguments = h, masses, springs, elastic, pinned, model.product_limit
-        step, converged = linearised_step(x, gradient, *arguments)
-        for i in range(len(x)):
-            for c in range(3):
-                end[i, c] = x[i, c] - step[i, c]
+    x, gradient, value = start
+    converged = model.product_limit > 0 and linearised_step(
+        (x, gradient), terms, model.product_limit, buffers.products, buffers.step
+    )
     if not converged:
         fill_hessian(model, buffers, x, terms, False)
         if eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
             return (value, 0.0, 0.0), False, number
         fill_descent(model.factor, buffers, gradient)
-        for i in range(len(x)):
-            for c in range(3):
-                end[i, c] = x[i, c] + buffers.step[i, c]
-    return fill_gradient(end, terms, buffers.end_gradient), True, number
+    for i in range(len(x)):
+        store_vector(buffers.end, i, add(load_vector(x, i), load_vector(buffers.step, i)))
+    return fill_gradient(buffers.end, terms, buffers.end_gradient), True, number
 
 
 def never(model, buffers, x, terms):

@@ -53,9 +53,9 @@ def step_end(x_n, x, h, history):
     end, bounded = np.empty((2, len(x), 3)), True
     for i in range(len(x)):
         for c in range(3):
-            end[0, i, c], end[1, i, c] = x[i, c], (x[i, c] - x_n[i, c]) / h
-            for values in end:
-                bounded = bounded and abs(values[i, c]) <= LARGEST_COORDINATE
+            place, rate = x[i, c], (x[i, c] - x_n[i, c]) / h
+            end[0, i, c], end[1, i, c] = place, rate
+            bounded &= abs(place) <= LARGEST_COORDINATE and abs(rate) <= LARGEST_COORDINATE
     return end, (history if bounded else np.empty((2, 0)))
 
 

@@ -17,6 +17,7 @@ from ..sparse.dissection import Graph
 from ..sparse.multifrontal import Scratch, scratch_for
 from ..sparse.symbolic import Supernodes, SymbolicFactor, UpdateTree
 from ..sparse.triangular import REGISTER, RIGHT_HAND_SIDES, solve
+from .conjugate_gradients import ProductRoom, product_room
 from .objective import effective_stiffnesses
 from .stopping import AT_ROUNDING, CONVERGED, DIVERGED, GO_ON, SADDLE, outcome_at
 from .terms import (
@@ -166,6 +167,7 @@ class Buffers(NamedTuple):
     end: np.ndarray
     end_gradient: np.ndarray
     room: tuple[np.ndarray, np.ndarray]  # see `rounding_sums`
+    products: ProductRoom
 
 
 def buffers_for(model, n):
@@ -185,6 +187,7 @@ def buffers_for(model, n):
         np.empty((n, 3)),
         np.empty((n, 3)),
         (np.empty(n), np.empty(n)),
+        product_room(n if model.product_limit > 0 else 0, len(model.places)),
     )
 
 
