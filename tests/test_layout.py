@@ -30,7 +30,8 @@ BENCH = [  # each may import those before it
     "problems", "peers", "measure", "tables", "ranking", "figures", "player", "experiments",
     "compare", "page", "show",
 ]  # fmt: skip
-LIBRARIES = {"numpy", "scipy", "numba", "llvmlite"}  # llvmlite is numba's own
+# llvmlite is numba's own; filelock serves the cache of compiled kernels.
+LIBRARIES = {"numpy", "scipy", "numba", "llvmlite", "filelock"}
 RUBBISH = {"utils", "util", "helpers", "helper", "common", "misc"}
 FILES = {"pathlib", "os", "io", "shutil", "tempfile", "open", "fromfile", "tofile", "loadtxt"}
 CLOCKS = {"time", "datetime", "timeit", "perf_counter"}

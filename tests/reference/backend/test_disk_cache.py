@@ -5,8 +5,14 @@ import shutil
 import subprocess
 import sys
 import textwrap
+import threading
 
+import filelock
 import pytest
+from numba.core import config
+from numba.core.errors import TypingError
+
+from plumbob.reference.backend import compiled
 
 CALLER = textwrap.dedent("""
     import numpy as np
@@ -92,3 +98,39 @@ def test_a_kernel_runs_where_nothing_can_be_saved(tmp_path):
         (folder / name).write_text("")
     home = str(folder / "home")
     assert run(folder, HOME=home, XDG_CACHE_HOME=home) == [COMPILED]
+
+
+def doubled(x):
+    return 2.0 * x
+
+
+def kernel_of_another_process():
+    """Return a kernel that knows of no version but those on disk."""
+    return compiled.compile_kernel.__wrapped__(doubled)
+
+
+@pytest.fixture
+def index(tmp_path, monkeypatch):
+    """The index of the only kernel in the cache."""
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    kernel_of_another_process()(2.0)
+    return next(tmp_path.rglob("*.nbi"))
+
+
+def test_a_kernel_that_another_process_compiles_is_waited_for(index):
+    """This test is the other process: it has the lock, and brings the file before it lets go."""
+    away = index.rename(index.with_suffix(".away"))
+    kernel = kernel_of_another_process()
+    thread = threading.Thread(target=kernel, args=[2.0])
+    with filelock.FileLock(f"{index}.lock"):
+        thread.start()
+        thread.join(0.3)  # in which a kernel that does not wait is compiled
+        away.rename(index)
+    thread.join()
+    assert [*kernel.stats.cache_hits.values()] == [1]
+
+
+def test_nobody_waits_for_a_kernel_that_cannot_be_compiled(index):
+    with pytest.raises(TypingError):
+        kernel_of_another_process()("text")
+    filelock.FileLock(f"{index}.lock").acquire(timeout=0.0)
