@@ -30,9 +30,9 @@ def distribution_of(package: str, environment: str = "") -> importlib.metadata.D
 
 
 @functools.cache
-def version(package: str) -> str:
-    """Return the version of a package, "" if not installed."""
-    distribution = distribution_of(package)
+def version(package: str, environment: str = "") -> str:
+    """Return the version of a package in a peer's environment, or in ours if "", "" if missing."""
+    distribution = distribution_of(package, environment)
     return distribution.version if distribution else ""
 
 

@@ -1,11 +1,10 @@
 """A peer: a solver of a package behind an adapter, and the settings with which it runs."""
 
-import importlib.metadata
 from collections.abc import Iterator, Mapping
 from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Any
 
-from .packages import distribution_of
+from . import packages
 from .user_solver import UserSolver
 
 # A single attempt, a portfolio of several, and restarts from random poses until the solver succeeds
@@ -106,16 +105,11 @@ class Peer:
             yield replace(self, title=run.title, runs=(run,))
 
     @property
-    def distribution(self) -> importlib.metadata.Distribution | None:
-        """The package where installed, None if not installed."""
-        return distribution_of(self.package, self.environment)
-
-    @property
     def version(self) -> str:
         """The installed version, "" if there is none; a user's solver states its own."""
         if self.user_solver:
             return self.user_solver.version
-        return self.distribution.version if self.distribution else ""
+        return packages.version(self.package, self.environment)
 
     @property
     def is_installed(self) -> bool:
