@@ -11,13 +11,14 @@ from plumbob.verify.disciplines import DISCIPLINES
 from plumbob.verify.exchange import Answer
 from plumbob.verify.greeting import PROTOCOL, Greeting
 from plumbob.verify.judgement import CaseJudgement
-from plumbob.verify.kinematics import robot_jacobian, robot_models, robot_targets, robot_velocity
+from plumbob.verify.kinematics import robot_jacobian, robot_models, robot_velocity
+from plumbob.verify.kinematics.robot_targets import AT_A_LIMIT, CLOSE, STEP, TASK
 from plumbob.verify.kinematics.trajectories import trajectory_of
 from plumbob.verify.laws import finding
 from plumbob.verify.observe.observations import of_tables
 from plumbob.verify.observe.robots import robot_evidence
 
-POSE, TRACK = robot_targets.TASK, "robot_track"
+POSE, TRACK = TASK, "robot_track"
 JACOBIAN, VELOCITY = robot_jacobian.TASK, robot_velocity.TASK
 
 
@@ -37,12 +38,10 @@ def observed(task, outputs_of, chosen=None, findings_of=lambda case: ()):
     return " ".join(str(s.sentence) for s in (*evidence.statements, *places))
 
 
-def poses(*families):
+@cache
+def poses(family):
     """Return cases of robots of at least six joints."""
-    return [c for c in cases(POSE) if c.family in families and len(c.inputs["axes"]) >= 6]
-
-
-NEAR, STEPS = poses(robot_targets.CLOSE), poses(robot_targets.STEP)
+    return [c for c in cases(POSE) if c.family == family and len(c.inputs["axes"]) >= 6]
 
 
 @cache
@@ -75,7 +74,7 @@ def beyond(case, side, joints=slice(None)):
 
 
 def test_nothing_is_said_of_right_poses():
-    assert observed(POSE, lambda case: {"q": solved(case)}, NEAR + STEPS) == ""
+    assert observed(POSE, lambda case: {"q": solved(case)}, poses(CLOSE) + poses(STEP)) == ""
 
 
 WRONG_POSES = [
@@ -91,7 +90,7 @@ WRONG_POSES = [
 
 @pytest.mark.parametrize(("answer", "words"), WRONG_POSES)
 def test_another_meaning_of_coordinates_and_the_place_of_wrong_ones_are_said(answer, words):
-    assert words in observed(POSE, lambda case: {"q": answer(case)}, NEAR)
+    assert words in observed(POSE, lambda case: {"q": answer(case)}, poses(CLOSE))
 
 
 def test_targets_that_joints_at_limits_alone_miss_are_counted():
@@ -99,7 +98,7 @@ def test_targets_that_joints_at_limits_alone_miss_are_counted():
         free = right_pose(case.name, lower=-9.0, upper=9.0)
         return np.clip(free, case.inputs["lower"], case.inputs["upper"])
 
-    limited = poses(robot_targets.AT_A_LIMIT)
+    limited = poses(AT_A_LIMIT)
     text = observed(POSE, lambda case: {"q": clamped(case)}, limited)
     assert "are missed by joints at their limits alone" in text
     assert "limits alone" not in observed(POSE, lambda case: {"q": solved(case)}, limited)
@@ -111,14 +110,14 @@ def test_targets_that_joints_at_limits_alone_miss_are_counted():
      ((-1.0, 1.0), "linear part")],
 )  # fmt: skip
 def test_the_factor_of_errors_in_a_single_iteration_is_measured(factors, words):
-    assert words in observed(POSE, lambda case: {"q": solved(case, *factors)}, STEPS)
+    assert words in observed(POSE, lambda case: {"q": solved(case, *factors)}, poses(STEP))
 
 
 def test_a_part_of_the_target_that_is_missed_is_counted():
     tilted = [
         replace(case, name=f"{case.name} {i}", inputs={
             **case.inputs, "target_rotation": case.inputs["target_rotation"][[1, 0, 3, 2]]})
-        for case in NEAR for i in range(6)
+        for case in poses(CLOSE) for i in range(6)
     ]  # fmt: skip
     text = observed(POSE, lambda case: {"q": right_pose(case.name[:-2])}, tilted)
     assert f"the position of {len(tilted)} and to the rotation of 0" in text
