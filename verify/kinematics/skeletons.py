@@ -4,8 +4,9 @@ No pose is at rest: with all rotations the identity most faults of forward kinem
 No two links are equally long: otherwise a wrong link's length would not show.
 """
 
+import functools
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 
@@ -57,8 +58,14 @@ Draw = Callable[[CaseFamily, np.random.Generator], Problem]
 
 def drawn(
     task: str, draw: Draw[Problem], seed: int, repeats: int, planar: bool = False
-) -> Iterator[tuple[str, CaseFamily, Problem]]:
-    """Yield the name of each case of a task, its family and its random problem."""
+) -> tuple[tuple[str, CaseFamily, Problem], ...]:
+    """Return the name of each case of a task, its family and its random problem."""
+    return _drawn(task, draw, seed, repeats, planar)
+
+
+@functools.lru_cache(maxsize=16)  # the tasks of a seed, whose methods are asked the same
+def _drawn(task: str, draw: Draw[Any], seed: int, repeats: int, planar: bool) -> Any:
+    cases = []
     for name, entry in tomllib.loads(FILE.read_text(encoding="utf-8"))[task].items():
         target = entry.get("target") or entry.get("curve", [])
         family = CaseFamily(
@@ -66,9 +73,9 @@ def drawn(
             entry.get("tolerance", 1e-4), entry.get("sweeps", 60),
             entry.get("requirement", "must"), planar,
         )  # fmt: skip
-        for i in range(family.copies * repeats):
-            case = f"{name} {i + 1}"
-            yield case, family, draw(family, generator(seed, case))
+        names = [f"{name} {i + 1}" for i in range(family.copies * repeats)]
+        cases += [(case, family, draw(family, generator(seed, case))) for case in names]
+    return tuple(cases)
 
 
 def generator(seed: int, name: str) -> np.random.Generator:
