@@ -65,15 +65,18 @@ def read(kind: type[Typed], fields: Mapping[str, Any]) -> Typed:
         raise ValueError(str(error).replace("$.", "")) from None
 
 
-def number_names(kind: type[Values]) -> set[str]:
+@functools.cache
+def number_names(kind: type[Values]) -> frozenset[str]:
     """Return the names of the fields of a type that are no facts."""
     facts = {field.name for field in msgspec.structs.fields(kind) if "fact" in get_args(field.type)}
     return _names(kind) - _names(Values) - facts
 
 
-def array_names(kind: type[Values]) -> set[str]:
+@functools.cache
+def array_names(kind: type[Values]) -> frozenset[str]:
     """Return the names of the fields that hold arrays."""
-    return {f.name for f in msgspec.structs.fields(kind) if np.ndarray.__name__ in str(f.type)}
+    fields = msgspec.structs.fields(kind)
+    return frozenset(f.name for f in fields if np.ndarray.__name__ in str(f.type))
 
 
 @functools.cache
@@ -89,8 +92,9 @@ def facts_of(kind: type[Values]) -> type[Values]:
     return cast(type[Values], facts_only)
 
 
-def _names(kind: type[Values]) -> set[str]:
-    return {field.name for field in msgspec.structs.fields(kind)}
+@functools.cache
+def _names(kind: type[Values]) -> frozenset[str]:
+    return frozenset(field.name for field in msgspec.structs.fields(kind))
 
 
 def check_names(kind: type[Values], measured: Iterable[str]) -> None:
