@@ -77,9 +77,10 @@ def read_bytes(path: str | os.PathLike[str], *, largest: int = LARGEST) -> bytes
         if not Path(path).is_file():  # a pipe or a device might never end
             raise ValueError(f"{path}: expected a regular file")
         with open(path, "rb") as file:
-            content = file.read(largest + 1)
+            is_larger = os.fstat(file.fileno()).st_size > largest
+            content = b"" if is_larger else file.read(largest + 1)
     except OSError as error:
         raise ValueError(f"{path}: {error.strerror}") from None
-    if len(content) > largest:
+    if is_larger or len(content) > largest:
         raise ValueError(f"{path}: expected at most {largest} bytes, got more")
     return content
