@@ -15,6 +15,7 @@ from plumbob.reference.implicit_euler.certificate import (
     hessian_change,
     laplacian_norm,
     least_curvature,
+    scalar_bound,
 )
 from plumbob.reference.mass_spring import MassSpring, State
 
@@ -82,6 +83,60 @@ class TestCurvature:
         H = scipy.sparse.csc_array(np.diag([1.0, 3.0, 2.0]))
         assert least_curvature(H, 0.25)[0] == pytest.approx(least(H)[0] - 0.25, rel=1e-12)
         assert least(H)[0] < certificate.FIRST_SHIFT - EPS
+
+
+class TestScalarBound:
+    """The bound of the Hessian of many particles, by one number for each pair of them."""
+
+    @pytest.mark.parametrize("spread", [0.0, 0.3])
+    def test_the_hessian_is_above_it(self, network, rng, spread):
+        objective, x = step_of(*network)
+        free = objective.system.free
+        x = x + spread * rng.standard_normal(x.shape) * free[:, None]
+        S = np.kron(scalar_bound(objective, x).toarray(), np.eye(3))
+        H = free_hessian(objective, x)
+        assert np.linalg.eigvalsh(H - S)[0] >= -1e-12 * np.linalg.norm(H)
+        assert least_curvature(scalar_bound(objective, x), 0.0)[0] <= np.linalg.eigvalsh(H)[0]
+
+    @pytest.mark.parametrize("length", [0.7, 1.3])
+    def test_across_a_spring_it_is_the_hessian(self, length):
+        """h² k = 1 and r = 1 m beside a mass of 1 kg."""
+        system, state = one_spring()
+        objective = ImplicitEuler(system, h=h).objective(state)
+        x = np.array([[0.0, 0, 0], [length, 0, 0]])
+        S = scalar_bound(objective, x).toarray()
+        assert pytest.approx(1 + 1 - 1 / length, rel=1e-14) == S
+        assert pytest.approx(free_hessian(objective, x)[1, 1], rel=1e-14) == S[0, 0]
+
+    def test_a_slack_rope_adds_nothing(self):
+        system = MassSpring([1, 2], [[0, 1]], 1.0, 1e3, pinned=[0], tension_only=True)
+        x = np.array([[0.0, 0, 0], [0.5, 0, 0]])
+        objective = ImplicitEuler(system, h=h).objective(State(x, np.zeros((2, 3))))
+        assert scalar_bound(objective, x).toarray() == 2.0
+
+    def test_many_particles_are_certified_without_the_factor(self, swing, monkeypatch):
+        objective, x = step_of(*swing, h=1 / 60)
+        sharp = certify(objective, x)
+        monkeypatch.setattr(certificate, "MANY_PARTICLES", 20)
+        monkeypatch.setattr(objective, "hessian_at", None)
+        known = certify(objective, x)
+        assert known.covered
+        assert 0.5 * sharp.curvature < known.curvature <= 1.02 * sharp.curvature
+        assert known.distance >= 0.1 * sharp.distance  # which is rounding only
+
+    def test_where_springs_are_compressed_the_factor_decides(self, monkeypatch):
+        """The bound of a mass between springs that are stretched and compressed is negative."""
+        system = MassSpring(
+            [1, 1, 1, 1], [[0, 1], [1, 2], [1, 3]], 1.0, [4e3, 1e4, 1e4], pinned=[0, 2, 3],
+            gravity=(0, 0, 0),
+        )  # fmt: skip
+        x = np.array([[0.85, 0, 0], [0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]])
+        objective = ImplicitEuler(system, h=h).objective(State(x, np.zeros((4, 3))))
+        assert scalar_bound(objective, x).toarray() < 0
+        sharp = certify(objective, x)
+        monkeypatch.setattr(certificate, "MANY_PARTICLES", 0)
+        assert certify(objective, x) == sharp
+        assert sharp.curvature > 0.5
 
 
 def least(H):

@@ -65,9 +65,9 @@ def random_motion(seed, *, mildly=False):
     return system, State(x, rng.standard_normal((n, 3))), rng.standard_normal((n, 3)), pins_at, h
 
 
-def disturbed(seed, exponent):
+def disturbed(seed, exponent, *, mildly=False):
     """The objective of a step and a point 10^exponent beside where Newton's method ends."""
-    system, state, forces, pins_at, h = random_motion(seed)
+    system, state, forces, pins_at, h = random_motion(seed, mildly=mildly)
     integrator = ImplicitEuler(system, h=h, tolerance=1e-14)
     x = integrator.step(state, forces, pins_at).state.positions
     direction = np.random.default_rng([8, seed]).standard_normal(x.shape)
@@ -186,6 +186,15 @@ class TestCertificate:
             allowed = rounding_errors(objective, x).gradient / known.curvature
             assert known.distance <= 3.001 * error + 4 * allowed
             assert known.newton_step <= known.distance <= known.unique_within
+
+    @given(seeds, st.floats(-14.0, 0.0))
+    def test_of_many_particles_too(self, seed, exponent):
+        objective, x = disturbed(seed, exponent, mildly=True)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(certificate, "MANY_PARTICLES", 1)
+            known = certify(objective, x)
+        if known.covered:
+            assert distance_to_minimiser(oracle_of(seed, mildly=True), x) <= known.distance
 
     def test_it_is_no_idle_bound(self, beside_minimisers):
         """Half of the points are covered, most of them by hardly a fifth too much."""
