@@ -16,10 +16,10 @@ from .rows import ChangeVerdict, Pair, RowChange, RowKey
 # Arrays of measured times [s], by suite; the default is for all other suites.
 _DEFAULT_TIMES = frozenset({"seconds", "setup", "control", "overhead"})
 _TIMES: Mapping[str, frozenset[str]] = {
-    "cloth_scale": frozenset({"assembly", "factor", "refactor", "solve", "local", "step", "limit"})
+    "scale": frozenset({"seconds", "reading", "computing", "proof"})
 }
 # Bytes of memory, which depend on the state of the system.
-_MEMORY = frozenset({("cloth_scale", "before"), ("cloth_scale", "memory")})
+_MEMORY = frozenset({("scale", "proof_memory"), ("scale", "memory")})
 # Arrays of which smaller values are better.
 _ERRORS = frozenset({
     "residual", "error", "position", "rotation", "beyond", "excess", "drift", "difference",

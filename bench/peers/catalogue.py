@@ -105,9 +105,10 @@ PRESET, TIGHT = (
 )
 LIMIT_NAME = "limit: copying as many bytes"
 LIMIT = Solver(LIMIT_NAME, "plain copy of as many bytes", "", "ink", ranked=False)
+MACHINE = Solver("limit", "limit of the machine", "", "ink", ranked=False)
 _BENCHMARKED = (
     *(COMPILED, PREPARED, PLAIN, OUR_KINEMATICS, _BY_PINOCCHIO, _BY_MUJOCO),
-    *(PRESET, TIGHT, LIMIT, PLAIN_CALL),
+    *(PRESET, TIGHT, LIMIT, MACHINE, PLAIN_CALL),
 )
 
 
