@@ -203,7 +203,7 @@ def test_the_main_job_says_first_what_it_does_and_where(capsys, monkeypatch, emp
     code, out, _ = plumbob(capsys, "--output", "here")
     assert code == 1
     ((first, *_, last),) = calls
-    assert (first, last) == ("check", "cloth_scale")
+    assert (first, last) == ("check", "scale")
     assert {*calls[0]} == {*bench.SUITES}
     assert all(text in out for text in ("Pinocchio and MuJoCo", "here/index.html", "minute"))
 

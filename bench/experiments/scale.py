@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from itertools import product
+from operator import attrgetter
 from pathlib import Path
 from time import process_time
 from timeit import Timer
@@ -19,16 +20,8 @@ from unittest import mock
 import numpy as np
 import scipy
 
-from plumbob.reference import (
-    ImplicitEuler,
-    MassSpring,
-    State,
-    forward_kinematics,
-    scenes,
-    set_num_threads,
-    solve_ik,
-    symplectic_euler,
-)
+from plumbob import reference
+from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.backend.compiled import Kernel
 from plumbob.reference.implicit_euler.objective import global_matrix
@@ -55,7 +48,7 @@ STOPS: dict[str, dict[str, Any]] = {
 }
 EXPLICIT, SUPERNODAL, SCIPY = "symplectic Euler", *(s.name for s in catalogue.FACTORS)
 # Stiffness of all cloths [N/m], and others of the largest cloth.
-STIFFNESS, OTHERS = 1e4, (1e3, 1e5)
+STIFFNESS, EXTREMES = 1e4, (1e3, 1e5)
 # Particles along a side, and the shortest benchmark time [s] at which the cloth is measured.
 SIZES = {10: 0.0, 32: 0.0, 100: 0.0, 316: 1.0, 1000: 1.0}
 # SuperLU takes 19 s for 100,000 particles, and its time grows faster than their number.
@@ -65,6 +58,7 @@ JOINTS, TARGETS, DISTANCE = (10, 30, 100, 300, 1000), 5, 0.6
 LIMITS: dict[str, Any] = {"tolerance": 1e-6, "max_iterations": 2000}
 KINEMATICS = "forward kinematics"
 IK = ("ccd", "fabrik", "levenberg_marquardt", "damped_least_squares", "jacobian_transpose")
+CLOTH_METHODS = (EXPLICIT, *STOPS, SUPERNODAL, SCIPY)
 # Flops of a spring's pull on both ends, of an entry of L in a solve with L and L' for three
 # coordinates, and of a joint's global rotation (28) and position (33).
 SPRING_FLOPS, ENTRY_FLOPS, JOINT_FLOPS = 21, 12, 61
@@ -86,15 +80,15 @@ class Cost(Values, frozen=True, kw_only=True):
     size: Fact[int]  # particles or joints
     stiffness: Fact[float | None] = None  # [N/m]
     seconds: Floats1
-    memory: int  # the peak of the process
-    growth: int  # of the process by the work
-    reading: float = 0.0  # time of a plain read of as many bytes as must be read
-    computing: float = 0.0  # time of as many flops in a dense product
+    memory: float  # the peak of the process
+    growth: float  # of the process by the work
+    reading: float  # time of a plain read of as many bytes as must be read
+    computing: float  # time of as many flops in a dense product
     iterations: float | None = None  # mean of all targets
     residual: float | None = None
     solved: float | None = None  # share of the targets
     proof: float | None = None  # time of the certificate of a step, its memory and numbers
-    proof_memory: int | None = None
+    proof_memory: float | None = None
     distance: float | None = None
     curvature: float | None = None
 
@@ -104,36 +98,46 @@ KINDS = {"": Cost}
 
 def blocks(scale: Scale) -> Iterator[Block]:
     """Yield every size by every method, stiffnesses of the largest cloth, and the chains."""
-    seconds, sizes = scale.seconds, [n for n, least in SIZES.items() if scale.seconds >= least]
-    others = product(sizes[-1:], ["newton_cg"], OTHERS)
-    for size, solver, k in (*product(sizes, WORKS, [STIFFNESS]), *others):
-        case, own = (size, solver, k, seconds), {"size": size * size, "stiffness": k, "h": H}
-        own |= {"steps": STEPS} if solver == EXPLICIT else STOPS.get(solver, {})
-        measure = partial(in_a_fresh_process, PATIENCE, compiled_and_measured, *case)
+    seconds, sizes = scale.seconds, [n for n in SIZES if scale.seconds >= SIZES[n]]
+    cloths = [
+        *product(sizes, CLOTH_METHODS, [STIFFNESS]),
+        *product(sizes[-1:], ["newton_cg"], EXTREMES),
+    ]
+    for size, solver, k in cloths:
+        settings: dict[str, Any] = {"size": size * size, "stiffness": k, "h": H}
+        settings |= {"steps": STEPS} if solver == EXPLICIT else STOPS.get(solver, {})
+        case = PATIENCE, compiled_and_measured, size, solver, k, seconds
         if solver != SCIPY or size <= MAX_SIZE_SCIPY:
-            yield Block("scale", f"cloth/{size}x{size}", solver, measure, own, size=seconds)
+            measure: Callable[[], Measured] = partial(in_a_fresh_process, *case)
+            yield Block("scale", f"cloth/{size}x{size}", solver, measure, settings, size=seconds)
     run = secrets.token_hex(8)
     for joints, solver in product(JOINTS, (*IK, KINEMATICS)):
-        measure, own = partial(_measure_chain, run, joints, solver, seconds), {"size": joints}
-        own |= LIMITS
-        yield Block("scale", f"chain/{joints}", solver, measure, own, size=seconds)
+        measure, settings = partial(_chain, run, joints, seconds, solver), {"size": joints}
+        settings |= LIMITS
+        yield Block("scale", f"chain/{joints}", solver, measure, settings, size=seconds)
 
 
-def _measure_chain(run: str, joints: int, solver: str, seconds: float) -> Measured:
-    measured: Measured = _measure_chains(run, joints, seconds)[solver]
-    return measured
+def _chain(run: str, joints: int, seconds: float, solver: str) -> Measured:
+    costs: Measured = _chains(run, joints, seconds)[solver]
+    return costs
 
 
 @lru_cache(maxsize=1)  # the blocks of a length follow one another
-def _measure_chains(run: str, joints: int, seconds: float) -> Mapping[str, Any]:
+def _chains(run: str, joints: int, seconds: float) -> Mapping[str, Any]:
     return in_a_fresh_process(PATIENCE, measure_chains, joints, seconds)
 
 
 def compiled_and_measured(size: int, solver: str, stiffness: float, seconds: float) -> Measured:
     """Compile everything on a small cloth, then measure."""
-    with set_num_threads(1):
+    with reference.set_num_threads(1):
         measure_cloth(min(SIZES), solver, stiffness, 0.0)
         return measure_cloth(size, solver, stiffness, seconds)
+
+
+def measure_chains(joints: int, seconds: float) -> dict[str, dict[str, Any]]:
+    """Return the costs of a chain by method."""
+    with reference.set_num_threads(1):
+        return {solver: measure_chain(joints, solver, seconds) for solver in (*IK, KINEMATICS)}
 
 
 def billowing_cloth(size: int, stiffness: float = STIFFNESS) -> tuple[MassSpring, State]:
@@ -147,34 +151,36 @@ def billowing_cloth(size: int, stiffness: float = STIFFNESS) -> tuple[MassSpring
     return system, State(x, v)
 
 
-class Work(NamedTuple):
-    """A call to be timed, its result, and the least that it must do."""
+class WorkOfCall(NamedTuple):
+    """A call to be timed, its first result, the peak of memory, and the least that it must do."""
 
     call: Callable[[], Any]
     result: Any
+    memory: int  # [bytes]
     flops: float
     bytes_read: float = 0.0
     passes: int = 1  # over the same bytes
 
 
-def stepped(solver: str, system: MassSpring, state: State) -> Work:
+def frame(solver: str, system: MassSpring, state: State) -> WorkOfCall:
     """Return the work of a frame: passes over the springs, and solves if any."""
     solves: list[FloatArray] = []
     kernel = sparse_factor._solve
 
-    def counted(*arguments: Any) -> None:
+    def counting_solve(*arguments: Any) -> None:
         solves.append(arguments[4])  # the values of L
         kernel(*arguments)
 
-    call: Callable[[], Any] = partial(symplectic_euler, system, state, H / STEPS, steps=STEPS)
+    call: Callable[[], Any]
+    call = partial(reference.symplectic_euler, system, state, H / STEPS, steps=STEPS)
     if solver != EXPLICIT:
         call = partial(ImplicitEuler(system, h=H, solver=solver, **STOPS[solver]).step, state)
-    with mock.patch.object(sparse_factor, "_solve", counted):
+    with mock.patch.object(sparse_factor, "_solve", counting_solve):
         result = call()
     passes = len(solves) or STEPS
     flops = ENTRY_FLOPS * sum(map(len, solves)) + SPRING_FLOPS * passes * len(system.springs)
     bytes_read = 2 * sum(L.nbytes for L in solves) + passes * spring_bytes(system)
-    return Work(call, result, flops, bytes_read, passes)
+    return WorkOfCall(call, result, memory(), flops, bytes_read, passes)
 
 
 def spring_bytes(system: MassSpring) -> int:
@@ -184,13 +190,14 @@ def spring_bytes(system: MassSpring) -> int:
     return sum(array.nbytes for array in springs) + 6 * 8 * system.particle_count
 
 
-def factored(library: str, system: MassSpring, state: State) -> Work:
+def factorisation(library: str, system: MassSpring, state: State) -> WorkOfCall:
     """Return the work of a factor of M + h² L, ordered anew; the flops are those of our order."""
     matrix = global_matrix(system, H)
     symmetric = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
     by_scipy = partial(scipy.sparse.linalg.splu, matrix, "MMD_AT_PLUS_A", **symmetric)
     call = by_scipy if library == SCIPY else partial(CholeskyFactor, matrix)
-    return Work(call, call(), factor_flops(CholeskyFactor(matrix)))
+    result, peak = call(), memory()
+    return WorkOfCall(call, result, peak, factor_flops(CholeskyFactor(matrix)))
 
 
 def factor_flops(factor: CholeskyFactor) -> float:
@@ -201,35 +208,24 @@ def factor_flops(factor: CholeskyFactor) -> float:
     return float(np.sum((ends - np.arange(len(ends))).astype(float) ** 2))
 
 
-WORKS = {name: partial(stepped, name) for name in (EXPLICIT, *STOPS)}
-WORKS |= {name: partial(factored, name) for name in (SUPERNODAL, SCIPY)}
-METHODS = (*WORKS, *IK, KINEMATICS)
-
-
 def measure_cloth(size: int, solver: str, stiffness: float, seconds: float) -> dict[str, Any]:
     """Return the costs of a cloth, with the certificate of a step that is to converge."""
     name = f"cloth/{size}x{size}, {solver}"
     announce(f"{name}: cloth")
     before = memory(anew=True)
     system, state = billowing_cloth(size, stiffness)
-    work = WORKS[solver](system, state)
-    costs: dict[str, Any] = {"memory": memory(), "growth": memory() - before}
+    work = (frame if solver in (EXPLICIT, *STOPS) else factorisation)(solver, system, state)
+    costs: dict[str, Any] = {"memory": work.memory, "growth": work.memory - before}
     if solver in STOPS:
         costs |= {"residual": work.result.residual, "iterations": work.result.iterations}
     if solver == "newton_cg":
         announce(f"{name}: proof")
         certify = partial(ImplicitEuler(system, h=H).certify, state, work.result)
-        known, costs["proof"] = compute_time_of(certify)
-        costs |= {"distance": known.distance, "curvature": known.curvature}
-        why = "" if known.covered else known.coverage.sentence
+        certificate, costs["proof"] = compute_time_of(certify)
+        costs |= {"distance": certificate.distance, "curvature": certificate.curvature}
+        why = "" if certificate.covered else certificate.coverage.sentence
         costs |= {"proof_memory": memory(), "remark": why}
-    return costs | timed(work, seconds, name)
-
-
-def measure_chains(joints: int, seconds: float) -> dict[str, dict[str, Any]]:
-    """Return the costs of a chain by method."""
-    with set_num_threads(1):
-        return {solver: measure_chain(joints, solver, seconds) for solver in (*IK, KINEMATICS)}
+    return costs | times_beside_limits(work, seconds, name)
 
 
 def measure_chain(joints: int, solver: str, seconds: float) -> dict[str, Any]:
@@ -239,27 +235,29 @@ def measure_chain(joints: int, solver: str, seconds: float) -> dict[str, Any]:
 
     def solves() -> list[Any]:
         if solver == KINEMATICS:
-            return [forward_kinematics(skeleton, straight) for _ in targets]
-        return [solve_ik(skeleton, straight, target, solver, **LIMITS) for target in targets]
+            return [reference.forward_kinematics(skeleton, straight) for _ in targets]
+        starts = [(skeleton, straight, target, solver) for target in targets]
+        return [reference.solve_ik(*start, **LIMITS) for start in starts]
 
     solves()  # may compile
-    before, solutions = memory(anew=True), solves()
-    costs: dict[str, Any] = {"memory": memory(), "growth": memory() - before, "iterations": 1.0}
+    before, solutions, peak = memory(anew=True), solves(), memory()
+    costs: dict[str, Any] = {"memory": peak, "growth": peak - before, "iterations": 1.0}
     if solver != KINEMATICS:
         costs["iterations"] = float(np.mean([s.iterations for s in solutions]))
         costs["solved"] = float(np.mean([s.residual <= LIMITS["tolerance"] for s in solutions]))
     flops = costs["iterations"] * TARGETS * joints * JOINT_FLOPS
-    times = timed(Work(solves, solutions, flops), seconds, f"chain/{joints}, {solver}")
+    work = WorkOfCall(solves, solutions, peak, flops)
+    times = times_beside_limits(work, seconds, f"chain/{joints}, {solver}")
     return costs | {name: np.divide(time, TARGETS).tolist() for name, time in times.items()}
 
 
-def timed(work: Work, seconds: float, name: str) -> dict[str, Any]:
+def times_beside_limits(work: WorkOfCall, seconds: float, name: str) -> dict[str, Any]:
     """Return the times of work in rounds [s], and of as many bytes and flops as it must do."""
     read = max(8, min(LONGEST_READ, int(work.bytes_read / work.passes)))
     numbers, repeats, dense = np.ones(read // 8), -(-SHORTEST_READ // read), np.ones((ROWS, ROWS))
-    calls = {"seconds": work.call, "computing": lambda: dense @ dense}
+    calls: dict[str, Callable[[], Any]] = {"seconds": work.call, "computing": lambda: dense @ dense}
+    calls["reading"] = partial(_total, numbers, repeats)
     timers = {part: Timer(call, timer=process_time) for part, call in calls.items()}
-    timers["reading"] = Timer(partial(_total, numbers, repeats), timer=process_time)
     loops = {part: shape(timer, seconds)[0] for part, timer in timers.items()}
     times: dict[str, list[float]] = {part: [] for part in timers}
     limit = time_limit(seconds)
@@ -305,13 +303,11 @@ def memory(anew: bool = False) -> int:
 
 # What is shown.
 
-from operator import attrgetter
-
 from ..figures.chart import Panel, Series, declared_chart, series
 from ..figures.sketch import Sketch
 from ..tables.captions import Captions
 from ..tables.columns import text, words_in
-from ..tables.results import Results, grouped, label, listed
+from ..tables.results import Results, grouped, label, listed, solvers
 from ..tables.table import Column, Summary, words
 
 CAPTIONS = Captions(
@@ -353,7 +349,7 @@ def row_of(record: Record, smaller: Row | None = None) -> Row:
     """Return the row of a record."""
     values, title = record.values, TITLES.get(record.solver, label(record.solver))
     time = metrics.spread(values.seconds).median
-    growth = float(values.growth) if values.growth >= NOTICED else None
+    growth = values.growth if values.growth >= NOTICED else None
     limit, iteration = max(values.reading, values.computing), time / (values.iterations or 1.0)
     return Row(record, smaller, title, values.size, time, limit, iteration, growth)
 
@@ -365,19 +361,20 @@ def rows(kind: str, results: Results) -> list[Row]:
         for record in results.all("scale")
         if record.problem.startswith(kind) and record.values.stiffness in (None, STIFFNESS)
     ]
-    found: list[Row] = []
-    for record in sorted(records, key=lambda r: (METHODS.index(r.solver), r.values.size)):
-        same = [row for row in found if row.record.solver == record.solver]
-        found += [row_of(record, *same[-1:])]
-    return found
+    order = solvers(records)
+    records.sort(key=lambda record: (order.index(record.solver), record.values.size))
+    members: list[Row] = []
+    for record in records:
+        same = [row for row in members if row.record.solver == record.solver]
+        members += [row_of(record, *same[-1:])]
+    return members
 
 
 def proofs(results: Results) -> list[Row]:
     """Return the certified steps, by size and stiffness."""
-    found = [
-        row_of(record) for record in results.all("scale") if record.values.distance is not None
-    ]
-    return sorted(found, key=lambda row: (row.size, row.record.values.stiffness))
+    certified = [record for record in results.all("scale") if record.values.distance is not None]
+    certified.sort(key=lambda record: (record.values.size, record.values.stiffness))
+    return list(map(row_of, certified))
 
 
 def _times(unit: str, noun: str) -> tuple[Column, ...]:
@@ -462,9 +459,9 @@ def _by_method(kind: str, results: Results) -> dict[str, list[Row]]:
 
 def cloth_chart(results: Results) -> Sketch | None:
     """Show the time of each method beside its limit, and the factor by both libraries."""
-    found, panels = _by_method("cloth", results), []
-    scipys = [_curve(SCIPY, found.pop(SCIPY, []), attrgetter("time"))]
-    for solver, rows in found.items():
+    methods, panels = _by_method("cloth", results), []
+    scipys = [_curve(SCIPY, methods.pop(SCIPY, []), attrgetter("time"))]
+    for solver, rows in methods.items():
         curves = [_curve(catalogue.PLUMBOB, rows, attrgetter("time"))]
         curves += [_curve(LIMIT, rows, attrgetter("limit")), *scipys * (solver == SUPERNODAL)]
         panels.append(Panel(rows[0].title, tuple(curves)))
@@ -472,23 +469,22 @@ def cloth_chart(results: Results) -> Sketch | None:
 
 
 def memory_chart(results: Results) -> Sketch | None:
-    """Show the memory of each method."""
-    found = _by_method("cloth", results).items()
-    curves = tuple(_curve(name, rows, attrgetter("growth")) for name, rows in found)
+    """Show the peak memory of each method."""
+    methods, memory = _by_method("cloth", results).values(), attrgetter("record.values.memory")
+    curves = tuple(_curve(rows[0].title, rows, memory) for rows in methods)
     return _chart("scale_memory", [Panel("", curves)], results)
 
 
 def chain_chart(results: Results) -> Sketch | None:
     """Show the times of a solve and of an iteration, beside the limit of an iteration."""
-    found = [(name, rows) for name, rows in _by_method("chain", results).items() if name in IK]
+    methods = _by_method("chain", results)
+    yardsticks = [methods.pop(KINEMATICS)] if KINEMATICS in methods else []
+    limits = [_curve(LIMIT, rows, attrgetter("limit")) for rows in yardsticks]
     solves, iterations = (
-        [_curve(name, rows, attrgetter(time)) for name, rows in found]
+        tuple(_curve(name, rows, attrgetter(time)) for name, rows in methods.items())
         for time in ("time", "iteration")
     )
-    limit = [
-        _curve(LIMIT, rows, lambda row: row.limit * row.iteration / row.time) for _, rows in found
-    ]
-    panels = Panel("A solve", tuple(solves)), Panel("An iteration", (*iterations, *limit[:1]))
+    panels = Panel("A solve", solves), Panel("An iteration", (*iterations, *limits))
     return _chart("scale_chain", panels, results)
 
 
