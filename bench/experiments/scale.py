@@ -220,7 +220,7 @@ def measure_cloth(size: int, solver: str, stiffness: float, seconds: float) -> d
         costs |= {"residual": work.result.residual, "iterations": work.result.iterations}
     if solver == "newton_cg":
         announce(f"{name}: proof")
-        certify = partial(ImplicitEuler(system, h=H).certify, state, work.result)
+        certify = partial(ImplicitEuler(system, h=H, solver=solver).certify, state, work.result)
         certificate, costs["proof"] = compute_time_of(certify)
         costs |= {"distance": certificate.distance, "curvature": certificate.curvature}
         why = "" if certificate.covered else certificate.coverage.sentence
