@@ -8,6 +8,7 @@ import math
 import time
 from collections.abc import Callable
 from statistics import median
+from timeit import Timer
 from typing import Any, TypeVar
 
 T = TypeVar("T")
@@ -37,6 +38,11 @@ def compute_time_of(call: Callable[[], T]) -> tuple[T, float]:
     if wall < LONG or is_metered():  # the functions of a library are too short for the other clock
         return result, wall
     return result, min(wall, time.process_time() - processor)
+
+
+def processor_timer(call: Callable[[], object]) -> Timer:
+    """Return a timer of a call by the clock of the processor, for calls in a loop."""
+    return Timer(call, timer=time.process_time)
 
 
 def pace() -> float:

@@ -4,6 +4,7 @@ Each cloth and each chain is measured in its own process, on one thread: memory 
 freed would not count.
 """
 
+import math
 import resource
 import secrets
 import sys
@@ -12,8 +13,6 @@ from functools import lru_cache, partial
 from itertools import product
 from operator import attrgetter
 from pathlib import Path
-from time import process_time
-from timeit import Timer
 from typing import Any, NamedTuple
 from unittest import mock
 
@@ -24,11 +23,12 @@ from plumbob import reference
 from plumbob.reference import ImplicitEuler, MassSpring, State, scenes
 from plumbob.reference.arguments import FloatArray
 from plumbob.reference.backend.compiled import Kernel
+from plumbob.reference.implicit_euler.certificate import MANY_PARTICLES
 from plumbob.reference.implicit_euler.objective import global_matrix
 from plumbob.reference.sparse import CholeskyFactor
 from plumbob.reference.sparse import factor as sparse_factor
 
-from ..clock import compute_time_of, time_limit
+from ..clock import compute_time_of, processor_timer, time_limit
 from ..measure import metrics
 from ..measure.block import Block, Measured, Scale
 from ..measure.isolation import in_a_fresh_process
@@ -93,7 +93,7 @@ class Cost(Values, frozen=True, kw_only=True):
     curvature: float | None = None
 
 
-KINDS = {"": Cost}
+KINDS = {"cloth": Cost, "chain": Cost}
 
 
 def blocks(scale: Scale) -> Iterator[Block]:
@@ -109,12 +109,14 @@ def blocks(scale: Scale) -> Iterator[Block]:
         case = PATIENCE, compiled_and_measured, size, solver, k, seconds
         if solver != SCIPY or size <= MAX_SIZE_SCIPY:
             measure: Callable[[], Measured] = partial(in_a_fresh_process, *case)
-            yield Block("scale", f"cloth/{size}x{size}", solver, measure, settings, size=seconds)
+            yield Block("scale", f"cloth/{size}x{size}", solver, measure, settings, size=seconds,
+                        facts={"task": "cloth"})  # fmt: skip
     run = secrets.token_hex(8)
     for joints, solver in product(JOINTS, (*IK, KINEMATICS)):
         measure, settings = partial(_chain, run, joints, seconds, solver), {"size": joints}
         settings |= LIMITS
-        yield Block("scale", f"chain/{joints}", solver, measure, settings, size=seconds)
+        yield Block("scale", f"chain/{joints}", solver, measure, settings, size=seconds,
+                    facts={"task": "chain"})  # fmt: skip
 
 
 def _chain(run: str, joints: int, seconds: float, solver: str) -> Measured:
@@ -257,7 +259,7 @@ def times_beside_limits(work: WorkOfCall, seconds: float, name: str) -> dict[str
     numbers, repeats, dense = np.ones(read // 8), -(-SHORTEST_READ // read), np.ones((ROWS, ROWS))
     calls: dict[str, Callable[[], Any]] = {"seconds": work.call, "computing": lambda: dense @ dense}
     calls["reading"] = partial(_total, numbers, repeats)
-    timers = {part: Timer(call, timer=process_time) for part, call in calls.items()}
+    timers = {part: processor_timer(call) for part, call in calls.items()}
     loops = {part: shape(timer, seconds)[0] for part, timer in timers.items()}
     times: dict[str, list[float]] = {part: [] for part in timers}
     limit = time_limit(seconds)
@@ -312,7 +314,8 @@ from ..tables.table import Column, Summary, words
 
 CAPTIONS = Captions(
     __file__, targets=words(TARGETS), distance=words(DISTANCE), spring=words(SPRING_FLOPS),
-    entry=words(ENTRY_FLOPS), joint=words(JOINT_FLOPS),
+    entry=words(ENTRY_FLOPS), joint=words(JOINT_FLOPS), many=words(MANY_PARTICLES),
+    newton=words(STOPS["newton_cg"]["tolerance"]),
 )  # fmt: skip
 TITLES = {
     EXPLICIT: f"symplectic Euler, {STEPS} steps",
@@ -334,15 +337,16 @@ class Row(NamedTuple):
     size: int  # particles or joints
     time: float  # the median
     limit: float
+    above: float  # the time relative to the limit
     iteration: float  # time of an iteration
     growth: float | None  # memory for the work [bytes], None if too little is noticed
 
     def exponent(self, name: str) -> float | None:
         """Return the power of the size with which a number grows, None if not known twice."""
         numbers = [getattr(row, name) for row in (self, self.smaller) if row]
-        if self.smaller is None or None in numbers:
+        if self.smaller is None or None in numbers or min(numbers) <= 0.0:
             return None
-        return float(np.log(numbers[0] / numbers[1]) / np.log(self.size / self.smaller.size))
+        return math.log(numbers[0] / numbers[1]) / math.log(self.size / self.smaller.size)
 
 
 def row_of(record: Record, smaller: Row | None = None) -> Row:
@@ -351,28 +355,29 @@ def row_of(record: Record, smaller: Row | None = None) -> Row:
     time = metrics.spread(values.seconds).median
     growth = values.growth if values.growth >= NOTICED else None
     limit, iteration = max(values.reading, values.computing), time / (values.iterations or 1.0)
-    return Row(record, smaller, title, values.size, time, limit, iteration, growth)
+    above = metrics.ratio(time, limit)
+    return Row(record, smaller, title, values.size, time, limit, above, iteration, growth)
 
 
 def rows(kind: str, results: Results) -> list[Row]:
     """Return the rows of cloths of the common stiffness or of chains, by method and size."""
-    records = [
-        record
-        for record in results.all("scale")
-        if record.problem.startswith(kind) and record.values.stiffness in (None, STIFFNESS)
-    ]
+    records, common = results.all("scale", task=kind), (None, STIFFNESS)
     order = solvers(records)
+    records = [record for record in records if record.values.stiffness in common]
     records.sort(key=lambda record: (order.index(record.solver), record.values.size))
     members: list[Row] = []
     for record in records:
-        same = [row for row in members if row.record.solver == record.solver]
+        same = [
+            m for m in members if m.record.solver == record.solver and m.size < record.values.size
+        ]
         members += [row_of(record, *same[-1:])]
     return members
 
 
 def proofs(results: Results) -> list[Row]:
     """Return the certified steps, by size and stiffness."""
-    certified = [record for record in results.all("scale") if record.values.distance is not None]
+    cloths = results.all("scale", task="cloth")
+    certified = [record for record in cloths if record.values.distance is not None]
     certified.sort(key=lambda record: (record.values.size, record.values.stiffness))
     return list(map(row_of, certified))
 
@@ -385,7 +390,7 @@ def _times(unit: str, noun: str) -> tuple[Column, ...]:
         Column("time", unit, read=attrgetter("time")),
         Column("exponent of time", read=lambda row: row.exponent("time")),
         Column("limit", unit, read=attrgetter("limit")),
-        Column("relative to the limit", read=lambda row: row.time / row.limit),
+        Column("relative to the limit", read=attrgetter("above")),
     )
 
 
@@ -430,7 +435,7 @@ PROOF_COLUMNS = (
 def _summary(unit: str, noun: str, rows: Sequence[Row]) -> Summary:
     largest = max(row.size for row in rows)
     times = [
-        f"{row.title} {words_in(row.time, unit)} ({words(row.time / row.limit)} times the limit)"
+        f"{row.title} {words_in(row.time, unit)} ({words(row.above)} times the limit)"
         for row in rows
         if row.size == largest
     ]

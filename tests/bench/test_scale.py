@@ -29,7 +29,8 @@ def costs():
 
 def cloth(make, size, solver="newton_cg", stiffness=suite.STIFFNESS, **values):
     settings = {"size": size * size, "h": suite.H, "stiffness": stiffness}
-    return make.record("scale", f"cloth/{size}x{size}", solver, settings, COST | values, size=0)
+    return make.record("scale", f"cloth/{size}x{size}", solver, settings, COST | values, size=0,
+                       facts={"task": "cloth"})  # fmt: skip
 
 
 @pytest.mark.parametrize("solver", suite.CLOTH_METHODS)
@@ -168,7 +169,7 @@ def test_charts_show_methods_beside_their_limits(make):
                for name in suite.CLOTH_METHODS]  # fmt: skip
     records += [
         make.record("scale", f"chain/{n}", name, {"size": n}, {**COST, "iterations": 4.0,
-                    "seconds": [8.0]}, size=0)
+                    "seconds": [8.0]}, size=0, facts={"task": "chain"})
         for n in (10, 100) for name in (*suite.IK, suite.KINEMATICS)
     ]  # fmt: skip
     results = Results(records)
