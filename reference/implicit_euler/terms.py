@@ -10,7 +10,7 @@ import numpy as np
 from numpy import uint64 as at
 
 from ..arguments import LARGEST_COORDINATE
-from ..mass_spring import spring_frame, spring_stretch
+from ..mass_spring import spring_frame, spring_line, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
 EPS = float(np.finfo(float).eps)
@@ -173,9 +173,9 @@ def add_particles(x, particles, hh, first, last, gradient):
 
 def add_spring(x, i, j, k, rest_length, tension_only, gradient):
     """Add the gradient of a spring, k being h² times its stiffness; return its part of g."""
-    length, u = spring_frame(x, i, j)
+    length, p, inverse = spring_line(x, i, j)
     stretch = spring_stretch(length, rest_length, tension_only)
-    pull = scale(k * stretch, u)
+    pull = scale(k * stretch * inverse, p)
     store_vector(gradient, i, add(load_vector(gradient, i), pull))
     store_vector(gradient, j, subtract(load_vector(gradient, j), pull))
     return 0.5 * k * stretch * stretch
