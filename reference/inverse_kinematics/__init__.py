@@ -23,7 +23,7 @@ from .problem import (
     checked_targets,
     default_solver,
 )
-from .solve import solve_checked
+from .solve import solve_checked, solve_plain
 
 __all__ = [
     "IK_SOLVERS",
@@ -106,6 +106,10 @@ def solve_ik(
         0 if restarts is None else restarts, seed, record, phases,
     )  # fmt: skip
     model = checked_model(skeleton)
+    if prefer is None:
+        plain = solve_plain(model, local_rotations, target, effector, settings)
+        if plain is not None:
+            return plain
     targets = checked_targets(model, target, effector)
     if prefer is not None:
         return nearest_solution(model, local_rotations, targets, settings, prefer)

@@ -13,17 +13,10 @@ from ..model import Model, checked_model, coordinates_name, effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
 from ..skeleton import Skeleton
-from .problem import (
-    CheckedTarget,
-    Settings,
-    Target,
-    checked_settings,
-    checked_targets,
-    default_solver,
-)
+from .problem import Settings, Target, checked_settings, checked_targets, default_solver
 from .reduce import prepare, prepare_chain
 from .result import OUTCOME, result_on, result_size
-from .solve import OUTCOMES, PROVEN, prove_unreachable, solve_checked, target_rows
+from .solve import FREE_TARGET, OUTCOMES, PROVEN, prove_unreachable, solve_checked
 
 
 class PreparedIK(threading.local):
@@ -45,39 +38,24 @@ class PreparedIK(threading.local):
     ):
         """Allocate the arrays of a thread; `prepare_ik` checks the arguments."""
         prove: Any = None
-        shape: tuple[int, ...]
+        shape: tuple[int, ...] = (model.joint_count, 4)
         if isinstance(model, Skeleton):
             problem, kernel = prepare_chain(model, joint), settings.solver.chain
-            target, shape, length = np.empty(3), (model.joint_count, 4), 3
         else:
-            restarts, seed = settings.limits.restarts, settings.seed
-            problem, kernel = (
-                prepare(model, (joint,), (oriented,), restarts, seed),
-                settings.solver.mechanism,
-            )
-            target, shape = (
-                target_rows([CheckedTarget(joint, np.zeros(3), None, 1.0)], ()),
-                (model.coordinate_count,),
-            )
-            length = 7 if oriented else 3
-        start, memory = np.empty(shape), np.full(result_size(*problem[1:3], 1), np.nan)
-        result = result_on(memory, 1, *problem[1:3])
-        local, positions, figures, q, _ = [values[0] for values in result]
-        q = local if isinstance(model, Skeleton) else q
-        if isinstance(model, Articulation):
-            request = model, problem, target, memory, settings.limits
-            prove = partial(prove_unreachable, *request)
+            restarts, kernel = settings.limits.restarts, settings.solver.mechanism
+            problem = prepare(model, (joint,), (oriented,), restarts, settings.seed)
+            shape = (model.coordinate_count,)
+        length, sizes = 7 if oriented else 3, (problem.joints, problem.coordinates)
+        start, memory = np.empty(shape), np.full(result_size(*sizes, 1), np.nan)
+        target = FREE_TARGET[: 3 if isinstance(model, Skeleton) else None].copy()
+        local, positions, figures, q, _ = [values[0] for values in result_on(memory, 1, *sizes)]
+        if isinstance(model, Skeleton):
+            q = local
+        else:
+            prove = partial(prove_unreachable, model, problem, target, memory, settings.limits)
         self._problem, self._arrays = (model, joint, oriented, settings), (q, positions, figures)
-        call = partial(
-            kernel.in_force,
-            problem.memory,
-            settings.numbers,
-            start.reshape(-1),
-            target,
-            memory,
-            0,
-            1,
-        )
+        numbers = settings.numbers, start.reshape(-1), target, memory
+        call = partial(kernel.in_force, problem.memory, *numbers, 0, 1)
         self.coordinates, self.positions = frozen(q), frozen(positions)
         self.figures = frozen(figures)
         # one attribute, as a thread's attribute takes 0.05 µs
@@ -154,15 +132,9 @@ def prepare_ik(
         solver, default_restarts = default_solver(checked, likely)
         restarts = default_restarts if restarts is None else restarts
     settings = checked_settings(
-        solver,
-        tolerance,
-        tolerance_rotation,
-        max_iterations,
-        0 if restarts is None else restarts,
-        seed,
-        False,
-        phases,
-    )
+        solver, tolerance, tolerance_rotation, max_iterations,
+        0 if restarts is None else restarts, seed, False, phases,
+    )  # fmt: skip
     if isinstance(checked, Skeleton) and (is_oriented or settings.limits.restarts):
         raise ValueError(
             "model: expected an Articulation for rotations or restarts, got a Skeleton"
