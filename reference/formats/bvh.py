@@ -33,7 +33,6 @@ MAX_POSES = 20_000_000
 MAX_CHARACTERS = 100_000
 CHANNEL = re.compile(r"([XYZ])(POSITION|ROTATION)", re.IGNORECASE)
 COUNT = re.compile(r"[0-9]{1,9}")
-LINE = re.compile(r"\S[^\n]*")
 BRACES = re.compile(r"([{}])")
 ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX")
 CYCLIC = ("XYZ", "YZX", "ZXY")
@@ -115,19 +114,13 @@ class _Lines:
     """An iterator over the non-empty lines of a text with the current line number."""
 
     def __init__(self, text: str) -> None:
-        self.text = text
-        self.matches = LINE.finditer(text)
-        self.position = 0
+        self.numbered = enumerate(text.split("\n"), 1)
+        self.number = 1
 
     def __iter__(self) -> Iterator[str]:
-        for line in self.matches:
-            self.position = line.start()
-            yield line[0].rstrip()
-        self.position = len(self.text)
-
-    @property
-    def number(self) -> int:
-        return self.text.count("\n", 0, self.position) + 1
+        for self.number, line in self.numbered:
+            if line := line.strip():
+                yield line
 
     def next(self, expected: str) -> str:
         """Return the next line."""

@@ -74,15 +74,9 @@ def assemble(
     names, parents, offsets, frames, kinds, axes, lower, upper, cones, masses, centres = columns
     try:
         articulation = Articulation(
-            Skeleton(parents, offsets, names),
-            kinds,
-            axes,
-            frames=frames,
-            lower=lower,
-            upper=upper,
-            cones=cones,
-            mimics=mimics,
-        )
+            Skeleton(parents, offsets, names), kinds, axes, frames=frames, lower=lower,
+            upper=upper, cones=cones, mimics=mimics,
+        )  # fmt: skip
     except ValueError as error:
         raise ValueError(f"{origin}: {error}") from None
     home, weights = frozen(articulation.zero()), frozen(np.array(masses))
