@@ -26,15 +26,9 @@ from .problem import (
 from .solve import solve_checked, solve_plain
 
 __all__ = [
-    "IK_SOLVERS",
-    "RESTARTS",
-    "IKSolution",
-    "IKSolutions",
-    "Outcome",
-    "Target",
-    "all_solutions",
+    "IK_SOLVERS", "RESTARTS", "IKSolution", "IKSolutions", "Outcome", "Target", "all_solutions",
     "solve_ik",
-]
+]  # fmt: skip
 
 
 def solve_ik(
