@@ -118,9 +118,10 @@ class _Lines:
         self.number = 1
 
     def __iter__(self) -> Iterator[str]:
-        for self.number, line in self.numbered:
-            if line := line.strip():
-                yield line
+        for number, line in self.numbered:
+            self.number = number
+            if line.strip():
+                yield line.strip()
 
     def next(self, expected: str) -> str:
         """Return the next line."""

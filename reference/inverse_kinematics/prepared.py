@@ -16,7 +16,7 @@ from ..skeleton import Skeleton
 from .problem import Settings, Target, checked_settings, checked_targets, default_solver
 from .reduce import prepare, prepare_chain
 from .result import OUTCOME, result_on, result_size
-from .solve import FREE_TARGET, OUTCOMES, PROVEN, prove_unreachable, solve_checked
+from .solve import FREE_TARGET, OUTCOMES, PROVEN, prove_unreachable, refusal
 
 
 class PreparedIK(threading.local):
@@ -53,7 +53,7 @@ class PreparedIK(threading.local):
             q = local
         else:
             prove = partial(prove_unreachable, model, problem, target, memory, settings.limits)
-        self._problem, self._arrays = (model, joint, oriented, settings), (q, positions, figures)
+        self._problem = model, joint, oriented, settings
         numbers = settings.numbers, start.reshape(-1), target, memory
         call = partial(kernel.in_force, problem.memory, *numbers, 0, 1)
         self.coordinates, self.positions = frozen(q), frozen(positions)
@@ -85,24 +85,18 @@ class PreparedIK(threading.local):
                     prove()
                     outcome = figures.item(OUTCOME)
                 return OUTCOMES[outcome]
-        self._solve_checked(start, target)
-        return OUTCOMES[figures[OUTCOME]]
+        return self._solve_checked(start, target)
 
-    def _solve_checked(self, start: ArrayLike, target: ArrayLike) -> None:
-        """Solve by the route of `solve_ik`, which names what is wrong."""
+    def _solve_checked(self, start: ArrayLike, target: ArrayLike) -> Outcome:
+        """Solve for arguments of other types; name what is wrong with them."""
         model, joint, _, settings = self._problem
         _, shape, _, target_shape, *_ = self._work
         q = floats(coordinates_name(model), start, *shape)
         values = floats("target", target, *target_shape)
-        pose = Target(values[:3], values[3:] if len(values) > 3 else None, joint)
-        solution = solve_checked(model, q, checked_targets(model, pose, None), settings)
-        figures = (
-            solution.residual, solution.residual_rotation, solution.iterations, solution.outcome,
-            solution.merit, solution.excess,
-        )  # fmt: skip
-        results = solution.coordinates, solution.positions, figures
-        for array, row in zip(self._arrays, results, strict=True):
-            array[...] = row
+        if q is start and values is target:  # which the kernel has refused
+            pose = Target(values[:3], values[3:] if len(values) > 3 else None, joint)
+            raise refusal(model, q, checked_targets(model, pose, None), settings)
+        return self(q, values)
 
 
 def prepare_ik(

@@ -171,13 +171,9 @@ def check_numbers(targets: list[CheckedTarget]) -> list[CheckedTarget]:
 def check_single(targets: list[CheckedTarget]) -> list[CheckedTarget]:
     """Return the targets; a ValueError for a batch."""
     for target in targets:
-        for name, values, length in (
-            ("target", target.position, 3),
-            ("rotation", target.rotation, 4),
-        ):
-            if values is not None and values.ndim != 1:
-                got = arguments.shape(values.shape)
-                raise ValueError(f"{name}: expected shape ({length},), got {got}")
+        arguments.check_shape("target", target.position, 3)
+        if target.rotation is not None:
+            arguments.check_shape("rotation", target.rotation, 4)
     return targets
 
 

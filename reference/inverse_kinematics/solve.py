@@ -107,11 +107,13 @@ def solve_checked(
     batch = batch_shape(starts.shape[: -len(shape)], targets, name)
     if starts.ndim > len(shape):
         starts = arguments.spread(starts, (*batch, *shape))
-    on_chain = isinstance(model, Skeleton) and len(targets) == 1 and targets[0].rotation is None
-    solve = _solve_chains if on_chain else _solve_mechanisms
-    results = solve(model, starts.reshape(-1), targets, batch, settings)
+    if isinstance(model, Skeleton) and len(targets) == 1 and targets[0].rotation is None:
+        results = _solve_chains(model, starts.reshape(-1), targets, batch, settings)
+    else:
+        rows = target_rows(targets, batch)
+        results = _solve_mechanisms(model, starts.reshape(-1), targets, rows, settings)
     if results is None:
-        raise _refusal(model, start, targets, settings)
+        raise refusal(model, start, targets, settings)
     return _solution(*results, batch, isinstance(model, Skeleton), settings.record)
 
 
@@ -127,28 +129,19 @@ def _solve_chains(
     if memory is None:
         return None
     if settings.limits.restarts:
-        rows = target_rows(targets, batch)
         first = result_on(memory, len(positions) // 3, problem.joints, 0)
-        _restart(skeleton, target.joint, starts, rows, first, settings)
+        _restart(skeleton, starts, targets, target_rows(targets, batch), first, settings)
     return problem, memory
 
 
 def _solve_mechanisms(
-    model: Any, starts: FloatArray, targets: list[CheckedTarget], batch: tuple[int, ...],
+    model: Any, starts: FloatArray, targets: list[CheckedTarget], rows: FloatArray,
     settings: Settings,
-) -> Results | None:  # fmt: skip
-    """Return the results on a mechanism; None if some number is not valid."""
-    effectors = tuple([target.joint for target in targets])
-    oriented = tuple([target.rotation is not None for target in targets])
-    return run_mechanism(model, effectors, oriented, starts, target_rows(targets, batch), settings)
-
-
-def run_mechanism(
-    model: Skeleton | Articulation, effectors: tuple[int, ...], oriented: tuple[bool, ...],
-    starts: FloatArray, rows: FloatArray, settings: Settings,
 ) -> Results | None:  # fmt: skip
     """Return the results for rows of targets; None if some number is not valid."""
     articulation = balls(model) if isinstance(model, Skeleton) else model
+    effectors = tuple([target.joint for target in targets])
+    oriented = tuple([target.rotation is not None for target in targets])
     restarts, seed = settings.limits.restarts, settings.seed
     problem = prepare(articulation, effectors, oriented, restarts, seed)
     memory = run(problem, starts, rows, settings)
@@ -212,7 +205,7 @@ def prove_unreachable(
                     figures[i, OUTCOME] = PROVEN[outcome]
 
 
-def _refusal(
+def refusal(
     model: Skeleton | Articulation, start: ArrayLike, targets: list[CheckedTarget],
     settings: Settings,
 ) -> Exception:  # fmt: skip
@@ -255,8 +248,8 @@ def batch_shape(
 
 
 def _restart(
-    skeleton: Skeleton, effector: int, starts: FloatArray, rows: FloatArray, first: Result,
-    settings: Settings,
+    skeleton: Skeleton, starts: FloatArray, targets: list[CheckedTarget], rows: FloatArray,
+    first: Result, settings: Settings,
 ) -> None:  # fmt: skip
     """Put restarts in place of worse results, where a target in reach is not reached.
 
@@ -270,7 +263,7 @@ def _restart(
     if starts.size > first.local[0].size:
         starts = starts.reshape(n, -1)[unsolved].reshape(-1)
     remaining = rows.reshape(n, -1)[unsolved].reshape(-1)
-    results = run_mechanism(skeleton, (effector,), (False,), starts, remaining, settings)
+    results = _solve_mechanisms(skeleton, starts, targets, remaining, settings)
     assert results is not None, "both kernels accept the same starts and targets"
     problem, memory = results
     more = result_on(memory, len(unsolved), problem.joints, problem.coordinates)

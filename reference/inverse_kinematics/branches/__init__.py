@@ -23,6 +23,7 @@ from ..problem import (
     CheckedTarget,
     Target,
     check_numbers,
+    check_single,
     checked_settings,
     checked_targets,
 )
@@ -222,10 +223,7 @@ def _checked_pose(model: Articulation, target: Any, effector: int | str | None) 
             return CheckedTarget(joint, x, R, 1.0)  # type: ignore[arg-type]
     if not isinstance(target, Target) or target.rotation is None:
         raise ValueError(f"target: expected a Target with a rotation, got {shown(target)}")
-    (checked,) = checked_targets(model, target, effector)
-    arguments.check_shape("target", checked.position, 3)
-    arguments.check_shape("rotation", checked.rotation, 4)  # type: ignore[arg-type]
-    return checked
+    return check_single(checked_targets(model, target, effector))[0]
 
 
 def _all_solutions(arms: Arms, pose: CheckedTarget, restarts: int, seed: int) -> IKSolutions:
