@@ -2,7 +2,7 @@
 
 The route of a call: `solve_ik` checks settings, model and targets; `solve.py` hands them to the
 kernel of a solver, which stands at the end of its file (`fabrik.py`, `ccd.py`, `jacobian.py`,
-`levenberg_marquardt.py`). The kernel prepares a chain or a mechanism (`solve_chain.py`,
+`levenberg_marquardt.py`). The kernel prepares a chain or a mechanism (`chain.py`,
 `solve_mechanism.py`). From each start the loops of `restarts.py` call the solver's sweep or update.
 """
 

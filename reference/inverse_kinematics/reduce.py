@@ -18,8 +18,8 @@ from ..articulation import (
 )
 from ..quaternion import IDENTITY, add, load_quaternion, load_vector, multiply, rotate
 from ..skeleton import Skeleton
+from .chain import packed_chain
 from .mechanism import EFFECTOR, Mechanism, Problem, packed_problem
-from .solve_chain import packed_chain
 
 # Points coincide if their distance is at most this, over the reach.
 SPOT = 1e-9

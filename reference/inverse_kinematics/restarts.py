@@ -1,6 +1,6 @@
 """The loops of every solver: iterations of an attempt, and attempts from several starts.
 
-The loops work on the state of a chain of unlimited balls (`solve_chain.py`), of a mechanism
+The loops work on the state of a chain of unlimited balls (`chain.py`), of a mechanism
 (`solve_mechanism.py`) or of tasks (`descent.py`), through its `Operations`. Each state has a `row`
 of numbers, from which an attempt continues. Damping, limits of joints and steps towards targets out
 of reach are those of the updates.

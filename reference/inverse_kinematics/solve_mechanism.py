@@ -32,7 +32,7 @@ from ..quaternion import (
 )
 from .anderson import Mixing, forget, mixing_on, mixing_size
 from .bounded_step import FULL_CIRCLE, TaskSystem, new_system
-from .chain import BEND, POSITION_ROUNDING
+from .chain import BEND, POSITION_ROUNDING, on_chains, solve_chains
 from .far_step import FAR_STEP
 from .mechanism import (
     BACKWARD,
@@ -67,7 +67,6 @@ from .restarts import (
     solve_with_restarts,
 )
 from .result import OUTCOME, fill_figures, outcome_of, result_on
-from .solve_chain import on_chains, solve_chains
 
 # A start is stuck if it stalls within so few iterations away from its target. An example is a
 # straight chain, perhaps folded since, with its target on its own line.
