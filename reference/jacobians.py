@@ -28,8 +28,8 @@ from .articulation import (
     Articulation,
     articulated_pose,
     balls,
-    normalise_start,
     one_batch,
+    unit_start,
 )
 from .backend.compiled import Kernel
 from .model import Model, checked_model, effector_of
@@ -210,9 +210,7 @@ def _jacobians_batch(joints, effectors, q, J):
     count, unit = len(joints), np.empty(q.shape[1])
     positions, rotations = np.empty((count, 3)), np.empty((count, 4))
     for i in range(len(q)):
-        for k in range(len(unit)):
-            unit[k] = q[i, k]
-        if not normalise_start(joints, unit):
+        if not unit_start(joints, q[i], unit):
             return False
         articulated_pose(joints, unit, positions, rotations)
         for k in range(len(effectors)):

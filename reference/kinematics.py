@@ -2,7 +2,6 @@
 
 import functools
 import math
-import threading
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ from .backend.simd.vectors import (
     store_rotation,
     store_unit,
 )
-from .backend.threads import in_slices
+from .backend.threads import ArraysOfThread, in_slices
 from .model import Model, checked_model, coordinates_name
 from .quaternion import add, conjugate, load_vector, made_unit, multiply, rotate
 from .skeleton import POSE_FIELDS, Pose, PoseArrays, Skeleton, checked_skeleton, pose_arrays
@@ -85,7 +84,7 @@ def _skeleton_pose(skeleton: Skeleton, local: Any, out: PoseArrays) -> tuple[Any
     return _skeleton_pose(skeleton, rotation.unit("local_rotations", local), out)
 
 
-class PreparedKinematics(threading.local):
+class PreparedKinematics(ArraysOfThread):
     """Forward kinematics of a model, a pose a call, into the same arrays every time.
 
     A call takes a quarter of the time of `forward_kinematics` (ten balls): it allocates nothing,
@@ -111,13 +110,9 @@ class PreparedKinematics(threading.local):
             forward = functools.partial(kernel, unit)
         joints["position"] = joints["rotation"] = np.nan
         self.pose = Pose(frozen(joints["position"]), frozen(joints["rotation"]))
-        self._model, self._joints = model, joints
+        self._problem, self._joints = (model,), joints
         # one attribute, as a thread's attribute takes 0.05 µs
         self._work = forward, joints.view(FLOAT64), self.pose
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes a copy, which has arrays of its own."""
-        return type(self), (self._model,)
 
     def __call__(self, local_rotations: ArrayLike) -> Pose:
         """Return the pose of local rotations, (joint, 4); the next call overwrites the pose.
@@ -135,9 +130,9 @@ class PreparedKinematics(threading.local):
                     return pose
             except Exception:  # for other types, and so slow that later calls look first
                 self._work = functools.partial(_if_plain, forward, self._shape), table, pose
-        name = coordinates_name(self._model)
-        local = arguments.floats(name, local_rotations, *self._shape)
-        self._joints["position"], self._joints["rotation"] = forward_kinematics(self._model, local)
+        (model,) = self._problem
+        local = arguments.floats(coordinates_name(model), local_rotations, *self._shape)
+        self._joints["position"], self._joints["rotation"] = forward_kinematics(model, local)
         return self.pose
 
 

@@ -43,13 +43,6 @@ def coordinates_name(model: Skeleton | Articulation) -> str:
     return "local_rotations" if isinstance(model, Skeleton) else "q"
 
 
-def tips(model: Skeleton | Articulation) -> list[int]:
-    """Return the joints without children."""
-    tree = model if isinstance(model, Skeleton) else model.skeleton
-    parents = set(tree.parents.tolist())
-    return [joint for joint in range(tree.joint_count) if joint not in parents]
-
-
 def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> int:
     """Return the index of the effector named; None is a Skeleton's last joint, else the only tip.
 
@@ -59,11 +52,8 @@ def effector_of(model: Skeleton | Articulation, effector: int | str | None) -> i
         return model.index(effector, "effector")
     if isinstance(model, Skeleton):
         return model.joint_count - 1
-    cache = model.__dict__
-    if "only_tip" not in cache:
-        ends = tips(model)
-        if len(ends) > 1:
-            names = ", ".join(model.names[tip] for tip in ends)
-            raise ValueError(f"effector: expected one of the tips {names}, got none")
-        cache["only_tip"] = ends[0]
-    return cache["only_tip"]
+    tips = model.skeleton.tips
+    if len(tips) > 1:
+        names = ", ".join(model.names[tip] for tip in tips)
+        raise ValueError(f"effector: expected one of the tips {names}, got none")
+    return tips[0]

@@ -62,6 +62,11 @@ class Skeleton(KeepsReadOnly):
         """Number of joints, the root included."""
         return len(self.arrays.parents)
 
+    @functools.cached_property
+    def tips(self) -> list[int]:
+        """The joints without children."""
+        return sorted({*range(self.joint_count)}.difference(self.parents.tolist()))
+
     @property
     def link_lengths(self) -> FloatArray:
         """Distance of each joint from its parent [m], shape (joint,); zero for the root."""

@@ -72,7 +72,7 @@ def _along(
     curve: ArrayLike | problem.Target | Sequence[problem.Target],
     effector: int | str | None,
 ) -> list[problem.CheckedTarget]:
-    """Return the targets of all effectors, each spread over all frames."""
+    """Return the targets of all effectors, some of them for all frames."""
     if not (isinstance(curve, problem.Target) or problem.are_targets(curve)):
         curve = arguments.coordinates("curve", cast(ArrayLike, curve), "frame", 3)
     targets = problem.checked_targets(skeleton, curve, effector)
@@ -82,10 +82,7 @@ def _along(
         raise ValueError(f"curve: expected shape (frame, 3), got {got}")
     if batch[0] == 0:
         raise ValueError("curve: expected at least one point, got none")
-    return [
-        target.mapped(lambda values: arguments.spread(values, (batch[0], values.shape[-1])))
-        for target in problem.check_numbers(targets)
-    ]
+    return problem.check_numbers(targets)
 
 
 def _start(model: Skeleton | Articulation, start: ArrayLike | None) -> FloatArray:

@@ -77,6 +77,15 @@ def in_slices(
             part.cancel()
 
 
+class ArraysOfThread(threading.local):
+    """An object with arrays of its own in each thread that shares the object, and in a copy."""
+
+    _problem: tuple[Any, ...]  # the arguments of its constructor
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), self._problem
+
+
 def _result(part: Future[Any]) -> Any:
     """Wait for a slice, and see an interrupt within `POLL` seconds."""
     while not part.done():

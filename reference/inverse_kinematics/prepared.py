@@ -1,6 +1,5 @@
 """Inverse kinematics of single targets, into the same arrays every time."""
 
-import threading
 from functools import partial
 from typing import Any
 
@@ -9,6 +8,7 @@ from numpy.typing import ArrayLike
 
 from ..arguments import boolean, floats, frozen, is_plain
 from ..articulation import Articulation
+from ..backend.threads import ArraysOfThread
 from ..model import Model, checked_model, coordinates_name, effector_of
 from ..outcome import Outcome
 from ..quaternion import IDENTITY
@@ -19,7 +19,7 @@ from .result import OUTCOME, result_on, result_size
 from .solve import FREE_TARGET, OUTCOMES, PROVEN, prove_unreachable, refusal
 
 
-class PreparedIK(threading.local):
+class PreparedIK(ArraysOfThread):
     """Inverse kinematics of a model, a single target a call, into the same arrays every time.
 
     Each thread that shares the object has arrays of its own, NaN before its first call.
@@ -60,10 +60,6 @@ class PreparedIK(threading.local):
         self.figures = frozen(figures)
         # one attribute, as a thread's attribute takes 0.05 µs
         self._work = call, shape, start, (length,), target[:length], self.figures, prove
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes a copy, which has arrays of its own."""
-        return type(self), self._problem
 
     def __call__(self, start: ArrayLike, target: ArrayLike) -> Outcome:
         """Solve for a target from a start; return the outcome.

@@ -1,7 +1,7 @@
 """The targets of a solve, its settings and its solution; the solvers by name."""
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeGuard
 
@@ -103,11 +103,6 @@ class CheckedTarget(NamedTuple):
     position: FloatArray  # [m], (..., 3)
     rotation: FloatArray | None  # (..., 4), or None
     weight: float  # greater than zero
-
-    def mapped(self, change: Callable[[FloatArray], FloatArray]) -> "CheckedTarget":
-        """Return the target with its position and any rotation changed."""
-        Q = None if self.rotation is None else change(self.rotation)
-        return self._replace(position=change(self.position), rotation=Q)
 
 
 def checked_targets(

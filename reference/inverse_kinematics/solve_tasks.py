@@ -1,6 +1,5 @@
 """Tasks of a model, solved once, or prepared for many starts and targets."""
 
-import threading
 from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple
@@ -12,6 +11,7 @@ from .. import arguments
 from ..arguments import LARGEST_COORDINATE, FloatArray, frozen, shown
 from ..articulation import Articulation
 from ..backend.compiled import Kernel
+from ..backend.threads import ArraysOfThread
 from ..model import Model, checked_model, effector_of
 from ..outcome import Outcome
 from ..quaternion import made_unit
@@ -76,7 +76,7 @@ class TaskSolution(NamedTuple):
     outcome: Outcome
 
 
-class PreparedTasks(threading.local):
+class PreparedTasks(ArraysOfThread):
     """The tasks of a model for many starts and targets, solved into the same arrays every time.
 
     Each thread that shares the object has arrays and targets of its own, as `prepare_tasks` made
@@ -113,10 +113,6 @@ class PreparedTasks(threading.local):
         self._q, self._errors = np.full_like(state.best.q, np.nan), np.full(len(kinds), np.nan)
         self.coordinates, self.errors = frozen(self._q), frozen(self._errors)
         self.cost, self.iterations = np.nan, 0
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes a copy, which has arrays of its own."""
-        return type(self), self._problem
 
     def __call__(self, q: ArrayLike) -> Outcome:
         """Solve from a start, (coordinate,), brought within the limits; return the outcome.

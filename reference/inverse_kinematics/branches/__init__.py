@@ -6,7 +6,6 @@ angles of `subproblems.py`. `settle.py` checks the results by forward kinematics
 
 import itertools
 import math
-import threading
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
@@ -16,6 +15,7 @@ from numpy.typing import ArrayLike
 from ... import arguments
 from ...arguments import FloatArray, frozen, is_plain, shown
 from ...articulation import LIMIT_TOLERANCE, Articulation
+from ...backend.threads import ArraysOfThread
 from ...model import Model, checked_model, effector_of
 from ..bounded_step import FULL_CIRCLE
 from ..mechanism import TARGET
@@ -140,7 +140,7 @@ def all_solutions(
     return _all_solutions(arms_of(model, pose.joint, grid), pose, *search)
 
 
-class PreparedSolutions(threading.local):
+class PreparedSolutions(ArraysOfThread):
     """`all_solutions` of a robot, a pose a call; a closed form fills the same arrays every time.
 
     Each thread that shares the object has arrays of its own.
@@ -162,10 +162,6 @@ class PreparedSolutions(threading.local):
             }
         # one attribute, as a thread's attribute takes 0.05 µs
         self._work = shape, block[TARGET_AT:][:_POSE], kernel, block, lists
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Return what makes a copy, which has arrays of its own."""
-        return type(self), self._problem
 
     def __call__(self, target: ArrayLike) -> IKSolutions:
         """Return all solutions of a pose; the next call overwrites those of a closed form.
