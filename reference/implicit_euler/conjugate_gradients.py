@@ -71,7 +71,7 @@ class ProductRoom(NamedTuple):
 def product_room(particles, springs):
     """Return room for so many particles and springs."""
     blocks = np.empty((particles, 3)), np.empty((particles, 3))
-    return ProductRoom(np.zeros((2 * springs, 4)), *blocks, np.zeros((4, particles, 4)))
+    return ProductRoom(np.empty((2 * springs, 4)), *blocks, np.zeros((4, particles, 4)))
 
 
 @relaxed
@@ -121,6 +121,7 @@ def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
         for end in range(2):
             particle = at(springs[s, end])
             store_vector(rows, at(2 * s + end), a)
+            rows[at(2 * s + end), 3] = 0.0
             store_vector(diagonals, particle, add(load_vector(diagonals, particle), squares))
             store_vector(lower, particle, add(load_vector(lower, particle), products))
 

@@ -52,6 +52,7 @@ class Model(NamedTuple):
     starts: np.ndarray
     diagonal: np.ndarray  # the places of the diagonal, (3 particle,)
     masses: np.ndarray  # on the diagonal, (3 particle,)
+    sums: np.ndarray  # see `sum_springs`; of undamped springs
     factor: SymbolicFactor
     damped: bool
     most_springs: int  # of a particle
@@ -81,6 +82,7 @@ def packed_model(
         place,
         *blocks[:3],
         *updates[:2],
+        separate.spring_sums,
     )
 
 
@@ -112,6 +114,7 @@ def model_in(memory):
         part(memory, 13, np.int32),
         part(memory, 14, np.int64),
         part(memory, 15, np.float64),
+        pairs(part(memory, 25, np.float64), 2),
         SymbolicFactor(graph, order, place, blocks, updates),
         numbers[3] > 0,
         numbers[4],
@@ -138,12 +141,13 @@ def step_by(method, memory, motion, external, targets, begin, h, stop):
     """
     model, (x_n, v_n) = model_in(memory), motion
     system, rest_lengths, constant = model.system, model.system.rest_lengths, 0.0
+    sums = model.sums
     if model.damped:
         rest_lengths, constant = blend_dampers(x_n, h, model.stiffnesses, system)
+        sums = sum_springs(system.masses, system.springs, rest_lengths, model.stiffnesses)
     y = inertial_positions(x_n, v_n, h, system.pinned, targets)
     elastic = rest_lengths, model.stiffnesses, system.tension_only
     terms = h, constant, (y, external, system.masses), system.springs, elastic, system.pinned
-    sums = sum_springs(system.masses, system.springs, rest_lengths, model.stiffnesses)
     floor = rounding_coefficients(y, external, h, system.masses, sums, model.free)
     buffers, history, x = buffers_for(model, len(y)), np.empty((2, stop[1] + 1)), y.copy()
     start = begin, x
