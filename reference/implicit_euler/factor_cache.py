@@ -16,21 +16,23 @@ from ..sparse import CholeskyFactor, NotPositiveDefiniteError
 from .objective import effective_stiffnesses, global_matrix
 
 # Factors by the digest of their matrix and by the digest of its sparsity pattern.
-_by_matrix: WeakValueDictionary[bytes, CholeskyFactor] = WeakValueDictionary()
+_by_matrix: WeakValueDictionary[tuple[bytes, bool], CholeskyFactor] = WeakValueDictionary()
 _by_pattern: WeakValueDictionary[bytes, CholeskyFactor] = WeakValueDictionary()
 
 
 class GlobalMatrixSolver:
     """A step solver that factorises M + h² L once for all steps."""
 
+    single_precision = False  # whether the factor is rounded to single precision
+
     def __init__(self, system: MassSpring, h: float) -> None:
-        self._factor = global_factor(system, h)
+        self._factor = global_factor(system, h, self.single_precision)
 
 
-def global_factor(system: MassSpring, h: float) -> CholeskyFactor:
+def global_factor(system: MassSpring, h: float, single: bool = False) -> CholeskyFactor:
     """Return the factor of M + h² L; an error if masses are too small beside h² k."""
     try:
-        return prefactored(global_matrix(system, h))
+        return prefactored(global_matrix(system, h), single)
     except NotPositiveDefiniteError:
         stiffest = float((h * h * effective_stiffnesses(system, h)).max(initial=0.0))
         raise NotPositiveDefiniteError(
@@ -47,17 +49,24 @@ def hessian_factor(system: MassSpring) -> CholeskyFactor:
     return prefactored(M)
 
 
-def prefactored(matrix: Any) -> CholeskyFactor:
-    """Return the factor of a sparse CSC matrix from the cache, or factorise the matrix."""
+def prefactored(matrix: Any, single: bool = False) -> CholeskyFactor:
+    """Return the factor of a sparse CSC matrix from the cache, or factorise the matrix.
+
+    `single` rounds the factor to single precision if it stays in range. Only the rounded factor
+    then stays in memory.
+    """
     digest = hashlib.blake2b(matrix.indptr)
     digest.update(matrix.indices)
     pattern = digest.digest()
     digest.update(matrix.data)
-    factor = _by_matrix.get(digest.digest())
-    if factor is None:
+    key = digest.digest(), single
+    factor = _by_matrix.get(key)
+    if factor is None and single:
+        factor = prefactored(matrix).in_single_precision()
+    elif factor is None:
         analysed = _by_pattern.get(pattern)
         factor = CholeskyFactor(matrix) if analysed is None else analysed.refactorize(matrix)
-        _by_matrix[digest.digest()] = _by_pattern[pattern] = factor
+    _by_matrix[key] = _by_pattern[pattern] = factor
     return factor
 
 

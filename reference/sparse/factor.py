@@ -1,5 +1,6 @@
 """Cholesky factors for callers: analyse, factorise, solve, factorise again."""
 
+import copy
 from typing import Any
 
 import numpy as np
@@ -9,9 +10,13 @@ from numpy.typing import ArrayLike
 from ..arguments import FloatArray, floats, shape, shown
 from ..backend.compiled import Kernel
 from .dissection import Graph
-from .multifrontal import factorize
+from .multifrontal import SMALLEST, factorize, round_entries
 from .symbolic import SymbolicFactor, analyse
 from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
+
+LARGEST = float(np.finfo(np.float32).max)
+# Entries below SMALLEST are then less than the rounding error of every pivot, and may be left out.
+SMALLEST_PIVOT = SMALLEST / float(np.finfo(np.float32).eps)
 
 
 class NotPositiveDefiniteError(ValueError):
@@ -65,13 +70,11 @@ class CholeskyFactor:
 
         Raise a ValueError if b has another shape or is not numeric.
         """
-        n, pattern = len(self.pattern.order), self.pattern
+        n = len(self.pattern.order)
         b = right_sides(b, n)
         if b.shape == (n, RIGHT_HAND_SIDES):
             x = np.empty(b.shape)
-            columns, starts, rows, _ = pattern.blocks
-            unknowns = np.empty((n, REGISTER))
-            _solve(pattern.order, columns, starts, rows, self._values, b, unknowns, x)
+            self.solve_into(b, x, np.empty((n, REGISTER)))
             return x
         columns = b.reshape(n, -1)
         x, padded = np.empty(columns.shape), np.zeros((n, RIGHT_HAND_SIDES))
@@ -80,6 +83,27 @@ class CholeskyFactor:
             padded[:, : part.stop - first] = columns[:, part]
             x[:, part] = self.solve(padded)[:, : part.stop - first]
         return x.reshape(b.shape)
+
+    def solve_into(self, b: FloatArray, x: FloatArray, workspace: FloatArray) -> None:
+        """Fill x, (n, 3), for unchecked b, (n, 3); the workspace has shape (n, 4)."""
+        columns, starts, rows, _ = self.pattern.blocks
+        _solve(self.pattern.order, columns, starts, rows, self._values, b, workspace, x)
+
+    def in_single_precision(self) -> "CholeskyFactor":
+        """Return the factor with L rounded, or the same factor if L leaves single precision."""
+        rounded = copy.copy(self)
+        rounded._values = np.empty(self.entries, np.float32)
+        largest = _round(self._values, rounded._values)
+        in_range = largest <= LARGEST and self._pivots.min(initial=1.0) >= SMALLEST_PIVOT
+        return rounded if in_range else self
+
+    @property
+    def _pivots(self) -> FloatArray:
+        """The diagonal of L, the first entry of each column, shape (n,)."""
+        columns, starts, *_ = self.pattern.blocks
+        ends = np.repeat(columns[1:] + np.diff(starts), np.diff(columns))
+        lengths = ends - np.arange(len(ends))
+        return self._values[np.cumsum(lengths) - lengths]
 
 
 def square(matrix: Any) -> Any:
@@ -103,3 +127,4 @@ def right_sides(b: ArrayLike, n: int) -> FloatArray:
 
 _factorize = Kernel(factorize, relaxed=True, label="sparse Cholesky factors")
 _solve = Kernel(solve, relaxed=True, label="sparse triangular solves")
+_round = Kernel(round_entries)

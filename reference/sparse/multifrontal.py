@@ -19,6 +19,7 @@ from numpy import uint64 as at
 from ..backend.compiled import relaxed, uncounted
 
 PANEL = 64  # rows eliminated one by one before the rest is updated
+SMALLEST = float(np.finfo(np.float32).tiny)  # a subnormal number takes longer to read
 STRIP = 256  # columns updated together, so that those of a panel stay in a near cache
 
 
@@ -195,3 +196,13 @@ def subtract_from_four(front, first, last, k, begin, end):
             front[k2, i] -= a2 * a
             front[k3, i] -= a3 * a
         j += 1
+
+
+def round_entries(values, rounded):
+    """Round entries to single precision, below SMALLEST to zero; return the largest size."""
+    largest = 0.0
+    for i in range(len(values)):
+        size = abs(values[i])
+        rounded[i] = values[i] if size >= SMALLEST else 0.0
+        largest = max(largest, size)
+    return largest

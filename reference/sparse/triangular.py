@@ -72,7 +72,7 @@ def eliminate(values, p, first, last, below, y, ahead):
         p = eliminate_four(values, p, size, j, last, below, y)
         j += 4
     while j < last:
-        a = scale_row(1.0 / values[at(p)], load_row(y, at(j)))
+        a = scale_row(1.0 / float(values[at(p)]), load_row(y, at(j)))
         store_row(y, at(j), a)
         p += 1
         for i in range(j + 1, last):
@@ -102,7 +102,7 @@ def substitute(values, p, first, last, below, y, ahead):
         for i in range(below.length):
             a = subtract_scaled(a, values[at(q)], load_row(y, row_below(below, i)))
             q += 1
-        store_row(y, at(j), scale_row(1.0 / values[at(p)], a))
+        store_row(y, at(j), scale_row(1.0 / float(values[at(p)]), a))
     while j > first:
         j -= 4
         size = last - j + below.length
@@ -134,14 +134,14 @@ def subtract_four(z, values, p, q, r, s, rows):
 def eliminate_four(values, p, size, j, last, below, y):
     """Do the same as `eliminate` for columns j to j + 3; return where they end."""
     p, q, r, s = four_columns(p, size)
-    a = scale_row(1.0 / values[at(p)], load_row(y, at(j)))
+    a = scale_row(1.0 / float(values[at(p)]), load_row(y, at(j)))
     b = subtract_scaled(load_row(y, at(j + 1)), values[at(p + 1)], a)
-    b = scale_row(1.0 / values[at(q)], b)
+    b = scale_row(1.0 / float(values[at(q)]), b)
     c = subtract_scaled(load_row(y, at(j + 2)), values[at(p + 2)], a)
-    c = scale_row(1.0 / values[at(r)], subtract_scaled(c, values[at(q + 1)], b))
+    c = scale_row(1.0 / float(values[at(r)]), subtract_scaled(c, values[at(q + 1)], b))
     d = subtract_scaled(load_row(y, at(j + 3)), values[at(p + 3)], a)
     d = subtract_scaled(d, values[at(q + 2)], b)
-    d = scale_row(1.0 / values[at(s)], subtract_scaled(d, values[at(r + 1)], c))
+    d = scale_row(1.0 / float(values[at(s)]), subtract_scaled(d, values[at(r + 1)], c))
     store_row(y, at(j), a)
     store_row(y, at(j + 1), b)
     store_row(y, at(j + 2), c)
@@ -178,12 +178,12 @@ def substitute_four(values, p, size, j, last, below, y):
         b = subtract_scaled(b, values[at(q + k - 1 + i)], z)
         c = subtract_scaled(c, values[at(r + k - 2 + i)], z)
         d = subtract_scaled(d, values[at(s + k - 3 + i)], z)
-    d = scale_row(1.0 / values[at(s)], d)
-    c = scale_row(1.0 / values[at(r)], subtract_scaled(c, values[at(r + 1)], d))
+    d = scale_row(1.0 / float(values[at(s)]), d)
+    c = scale_row(1.0 / float(values[at(r)]), subtract_scaled(c, values[at(r + 1)], d))
     b = subtract_scaled(subtract_scaled(b, values[at(q + 1)], c), values[at(q + 2)], d)
-    b = scale_row(1.0 / values[at(q)], b)
+    b = scale_row(1.0 / float(values[at(q)]), b)
     a = subtract_scaled(subtract_scaled(a, values[at(p + 1)], b), values[at(p + 2)], c)
-    a = scale_row(1.0 / values[at(p)], subtract_scaled(a, values[at(p + 3)], d))
+    a = scale_row(1.0 / float(values[at(p)]), subtract_scaled(a, values[at(p + 3)], d))
     store_row(y, at(j), a)
     store_row(y, at(j + 1), b)
     store_row(y, at(j + 2), c)

@@ -430,8 +430,9 @@ class TestUnusualSystems:
     def test_springs_without_rest_length_are_solved_at_once(
         self, name, backend, tension_only, network, altered
     ):
-        """g is quadratic, and M + h² L is its Hessian."""
+        """g is quadratic, and M + h² L is its Hessian; Newton-CG has it in single precision."""
         system, state = network
         linear = altered(system, rest_lengths=0.0, dampings=0.0, tension_only=tension_only)
-        result = stepped(linear, state, name, tolerance=1e-12)
+        tolerance = 1e-6 if name == "newton_cg" else 1e-12
+        result = stepped(linear, state, name, tolerance=tolerance)
         assert (result.outcome, result.iterations) == (Outcome.CONVERGED, 1)

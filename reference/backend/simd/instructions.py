@@ -287,7 +287,7 @@ def prefetch(typingctx, values, i):
         _prefetch(builder, builder.bitcast(entry, POINTER), LINE_BYTES, READ)
         return context.get_dummy_value()
 
-    return types.none(_contiguous(values, 1), i), generate
+    return types.none(values, i), generate
 
 
 def _reader(count):

@@ -151,6 +151,41 @@ def test_a_factor_too_large_for_a_near_cache_solves_as_well(rng):
     np.testing.assert_allclose(factor.solve(A @ x), x, rtol=0, atol=1e4 * EPS)
 
 
+def test_a_factor_in_single_precision_solves_to_its_rounding(backend, matrix, rng):
+    x = rng.standard_normal((matrix.shape[0], 3))
+    exact = CholeskyFactor(matrix)
+    rounded = exact.in_single_precision()
+    assert (exact._values.itemsize, rounded._values.itemsize) == (8, 4)
+    solution = rounded.solve(matrix @ x)
+    # Dominance keeps the condition number below 1000.
+    np.testing.assert_allclose(solution, x, rtol=0, atol=1000 * np.finfo(np.float32).eps)
+    assert matrix.shape[0] < 5 or np.abs(solution - x).max() > EPS
+
+
+@pytest.mark.parametrize(
+    ("diagonal", "coupling", "in_range"),
+    [
+        ([1.0, 1.0, 1.0], 1e-43, True),
+        ([1e75, 1.0, 1e-60], 1e-40, True),
+        ([1e78, 1.0, 1.0], 0.5, False),
+        ([1.0, 1e-64, 1.0], 0.0, False),
+        ([1e-75, 1e-75, 1e-75], 0.0, False),
+    ],
+)
+def test_a_factor_beyond_single_precision_is_left_as_it_is(backend, diagonal, coupling, in_range):
+    """Small entries off the diagonal may vanish; a pivot that did would divide by zero."""
+    matrix = np.diag(diagonal)
+    matrix[0, 1] = matrix[1, 0] = coupling
+    matrix = scipy.sparse.csc_array(matrix)
+    exact = CholeskyFactor(matrix)
+    rounded = exact.in_single_precision()
+    assert (rounded is not exact) == in_range
+    x = np.arange(1.0, 10.0).reshape(3, 3)
+    np.testing.assert_allclose(rounded.solve(matrix @ x), x, rtol=1e-6, atol=0)
+    sizes = np.abs(rounded._values[rounded._values != 0])
+    assert sizes.min() >= np.finfo(rounded._values.dtype).tiny
+
+
 @pytest.mark.parametrize("sides", [(), (1,), (2,), (3,), (4,), (6,), (7,)])
 def test_any_number_of_right_hand_sides_gives_what_each_gives_by_itself(rng, sides):
     matrix = definite(PATTERNS["cloth"])
