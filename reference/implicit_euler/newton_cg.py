@@ -23,7 +23,7 @@ from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring, is_slack, spring_frame, transverse_share
 from ..quaternion import add, dot, load_vector, scale, store_vector, subtract
 from .factor_cache import GlobalMatrixSolver
-from .line_search import line_search
+from .line_search import inner_product, line_search
 from .objective import Iterate, Objective
 
 LARGEST_TOLERANCE = 0.1  # of the error of a step, relative to the step
@@ -126,14 +126,6 @@ def update(length, p, Hp, s, r):
         for c in range(3):
             s[i, c] += length * p[i, c]
             r[i, c] -= length * Hp[i, c]
-
-
-def inner_product(a, b):
-    """Return a' b."""
-    total = 0.0
-    for i in range(len(a)):
-        total += dot(load_vector(a, i), load_vector(b, i))
-    return total
 
 
 def turn(share, z, p):

@@ -19,9 +19,9 @@ from ..backend.simd.vectors import load_row, prefetch, scale_row, store_row, sub
 
 # Right-hand sides solved together, and the doubles of a register with an unknown of each.
 RIGHT_HAND_SIDES, REGISTER = 3, 4
-# An L of more than NEAR entries does not stay in a near cache: it is prefetched AHEAD of use.
-NEAR, AHEAD = 2**20, 1024
-LINE = 8  # entries that come from memory together
+# Entries of L are prefetched so far ahead of their use, row by row: prefetched many at a time they
+# keep the arithmetic waiting.
+AHEAD = 4096
 
 
 @relaxed
@@ -31,16 +31,16 @@ def solve(order, columns, starts, rows, values, b, y, x):
     The arguments are the fields of `Supernodes`: passing a tuple takes longer than solving a
     small system.
     """
-    p, ahead = starts[0], AHEAD if len(values) > NEAR else 0
+    p = starts[0]
     for j in range(len(order)):
         v = order[j]
         y[j, 0], y[j, 1], y[j, 2], y[j, 3] = b[v, 0], b[v, 1], b[v, 2], 0.0
     for s in range(len(columns) - 1):
         below = Below(rows, starts[s], starts[s + 1] - starts[s])
-        p = eliminate(values, p, columns[s], columns[s + 1], below, y, ahead)
+        p = eliminate(values, p, columns[s], columns[s + 1], below, y)
     for s in range(len(columns) - 2, -1, -1):
         below = Below(rows, starts[s], starts[s + 1] - starts[s])
-        p = substitute(values, p, columns[s], columns[s + 1], below, y, ahead)
+        p = substitute(values, p, columns[s], columns[s + 1], below, y)
     for j in range(len(order)):
         v = order[j]
         x[v, 0], x[v, 1], x[v, 2] = y[j, 0], y[j, 1], y[j, 2]
@@ -59,7 +59,7 @@ def row_below(below, i):
     return at(below.rows[at(below.start + i)])
 
 
-def eliminate(values, p, first, last, below, y, ahead):
+def eliminate(values, p, first, last, below, y):
     """Solve for the unknowns of a supernode and subtract their terms from the rows below.
 
     The columns of the supernode begin at p in `values`; return their end.
@@ -67,8 +67,6 @@ def eliminate(values, p, first, last, below, y, ahead):
     j = first
     while j + 4 <= last:
         size = last - j + below.length
-        if ahead > 0:
-            prefetch_columns(values, p + ahead, size)
         p = eliminate_four(values, p, size, j, last, below, y)
         j += 4
     while j < last:
@@ -86,7 +84,7 @@ def eliminate(values, p, first, last, below, y, ahead):
     return p
 
 
-def substitute(values, p, first, last, below, y, ahead):
+def substitute(values, p, first, last, below, y):
     """Solve for the unknowns of a supernode when all unknowns below are known.
 
     The columns of the supernode end at p in `values`; return their beginning.
@@ -107,16 +105,8 @@ def substitute(values, p, first, last, below, y, ahead):
         j -= 4
         size = last - j + below.length
         p -= 4 * size - 6
-        if ahead > 0:
-            prefetch_columns(values, p - ahead, size)
         substitute_four(values, p, size, j, last, below, y)
     return p
-
-
-def prefetch_columns(values, p, size):
-    """Prefetch four columns of `size` entries, which begin at p."""
-    for i in range(0, 4 * size, LINE):
-        prefetch(values, p + i)
 
 
 def four_columns(p, size):
@@ -133,6 +123,7 @@ def subtract_four(z, values, p, q, r, s, rows):
 
 def eliminate_four(values, p, size, j, last, below, y):
     """Do the same as `eliminate` for columns j to j + 3; return where they end."""
+    ahead = p + AHEAD
     p, q, r, s = four_columns(p, size)
     a = scale_row(1.0 / float(values[at(p)]), load_row(y, at(j)))
     b = subtract_scaled(load_row(y, at(j + 1)), values[at(p + 1)], a)
@@ -154,6 +145,7 @@ def eliminate_four(values, p, size, j, last, below, y):
     k = last - j - 4
     p, q, r, s = p + k, q + k, r + k, s + k
     for i in range(below.length):
+        prefetch(values, ahead + 4 * i)
         row = row_below(below, i)
         z = load_row(y, row)
         store_row(y, row, subtract_four(z, values, p + i, q + i, r + i, s + i, rows))
@@ -162,6 +154,7 @@ def eliminate_four(values, p, size, j, last, below, y):
 
 def substitute_four(values, p, size, j, last, below, y):
     """Do the same as `substitute` for columns j to j + 3."""
+    ahead = p - AHEAD
     p, q, r, s = four_columns(p, size)
     a, b = load_row(y, at(j)), load_row(y, at(j + 1))
     c, d = load_row(y, at(j + 2)), load_row(y, at(j + 3))
@@ -173,6 +166,7 @@ def substitute_four(values, p, size, j, last, below, y):
         d = subtract_scaled(d, values[at(s + i - 3)], z)
     k = last - j
     for i in range(below.length):
+        prefetch(values, ahead + 4 * i)
         z = load_row(y, row_below(below, i))
         a = subtract_scaled(a, values[at(p + k + i)], z)
         b = subtract_scaled(b, values[at(q + k - 1 + i)], z)
