@@ -40,7 +40,7 @@ class NewtonCG(GlobalMatrixSolver):
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield the objective's start, then the iterate after each iteration."""
-        iterate, workspace = objective.start, Workspace.of(objective.effective)
+        iterate, workspace = objective.start, CGVectors.of(objective.effective)
         while True:
             yield iterate
             relative = iterate.gradient_norm / (objective.inertial.gradient_norm or 1.0)
@@ -49,7 +49,7 @@ class NewtonCG(GlobalMatrixSolver):
             iterate = line_search(objective, iterate, step)
 
     def _step(
-        self, objective: Objective, iterate: Iterate, tolerance: float, workspace: "Workspace"
+        self, objective: Objective, iterate: Iterate, tolerance: float, workspace: "CGVectors"
     ) -> FloatArray:
         """Return s with H s = -grad g to a relative tolerance, truncated at negative curvature."""
         arrays, (blocks, unknowns, s, r, z, p, Hp) = objective.effective.arrays, workspace
@@ -72,7 +72,7 @@ class NewtonCG(GlobalMatrixSolver):
         return s
 
 
-class Workspace(NamedTuple):
+class CGVectors(NamedTuple):
     """Memory for the steps of an objective: fresh memory takes longer than the arithmetic."""
 
     blocks: FloatArray  # of the springs, see `factored_blocks`
@@ -84,7 +84,7 @@ class Workspace(NamedTuple):
     Hp: FloatArray
 
     @classmethod
-    def of(cls, system: MassSpring) -> "Workspace":
+    def of(cls, system: MassSpring) -> "CGVectors":
         """Return memory for the vectors of a system, each of shape (particle, 3)."""
         blocks, n = np.empty((len(system.springs), 4)), system.particle_count
         return cls(blocks, np.empty((n, 4)), *np.empty((5, n, 3)))
