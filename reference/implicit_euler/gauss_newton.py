@@ -41,9 +41,9 @@ class GaussNewton:
 
     def __init__(self, system: MassSpring, h: float) -> None:
         """Analyse the sparsity pattern, which the matrices of all steps share."""
-        analysed = hessian_factor(system)
-        self._model = system, h, analysed.pattern
-        self.limit_products(iteration_limit(system, h, analysed))
+        self._analysed = hessian_factor(system)
+        self._model = system, h, self._analysed.pattern
+        self.limit_products(iteration_limit(system, h, self._analysed))
 
     def limit_products(self, limit: int) -> None:
         """Let conjugate gradients take so many iterations before a factor is made, 0 for none."""
