@@ -25,13 +25,7 @@ from .chain import POSITION_ROUNDING
 from .far_step import fill_normal_equations, step_within_limits
 from .levenberg_marquardt import DAMPING_OF_TASKS
 from .linear_algebra import clear, inner
-from .mechanism import (
-    EFFECTOR,
-    ConfigurationData,
-    Mechanism,
-    new_data,
-    update_forward_kinematics,
-)
+from .mechanism import EFFECTOR, ConfigurationData, Mechanism, new_data, update_forward_kinematics
 from .restarts import (
     BEST,
     INFINITY,

@@ -116,20 +116,10 @@ def new_state(mechanism, depth, restarts, effector_frames, shares):
 
 
 def solve_mechanisms(operations, depth, problem, numbers, starts, targets, results, first, last):
-    """Solve the targets from `first` to `last`; return whether starts and targets were valid.
+    """Solve the targets from `first` to `last`, as `solve_chains` does, on a MechanismState.
 
-    Args:
-        operations: of a solver, on a MechanismState.
-        depth: how many sweeps the solver remembers.
-        problem: see `packed_problem`.
-        numbers: of Limits.
-        starts: coordinates of the articulation, of one start or of as many as targets, row after
-            row.
-        targets: records TARGET, made unit here, as numbers: target after target, effector after
-            effector.
-        results: see `result_on`.
-        first: index of the first target.
-        last: index behind the last.
+    The problem is that of `packed_problem`. Starts are coordinates of the articulation. Targets are
+    records TARGET, made unit here, as numbers: target after target, effector after effector.
     """
     joints, width, mechanism, restarts, effector_frames, shares = problem_on(problem)
     limits, numbers_of_target = limits_of(numbers), TARGET_WIDTH * len(mechanism.effectors)

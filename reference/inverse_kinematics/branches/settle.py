@@ -4,13 +4,7 @@ import math
 
 from ...articulation import HINGE, LIMIT_TOLERANCE
 from ...backend.compiled import Kernel
-from ..bounded_step import (
-    FULL_CIRCLE,
-    fill_errors,
-    fill_jacobian,
-    new_system,
-    solve_system,
-)
+from ..bounded_step import FULL_CIRCLE, fill_errors, fill_jacobian, new_system, solve_system
 from ..linear_algebra import clear, inner
 from ..mechanism import Mechanism, errors, new_data, update_forward_kinematics
 from ..restarts import copy_row
