@@ -62,12 +62,7 @@ def plumb_bob(count: int = 1200) -> FloatArray:
 
 
 curves: dict[str, Callable[..., FloatArray]] = {
-    "circle": circle,
-    "square": square,
-    "heart": heart,
-    "triangle": triangle,
-    "star": star,
-    "plumb_bob": plumb_bob,
+    curve.__name__: curve for curve in (circle, square, heart, triangle, star, plumb_bob)
 }
 
 

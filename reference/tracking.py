@@ -1,7 +1,6 @@
 """Following a curve frame by frame."""
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import cast
 
 from numpy.typing import ArrayLike
@@ -63,7 +62,7 @@ def track(
     settings = problem.checked_settings(
         solver, tolerance, tolerance_rotation, max_iterations, 0, 0, record, 1
     )
-    settings = replace(settings, limits=settings.limits._replace(chained=chained))
+    settings = settings.limited(chained=chained)
     return solve_checked(model, _start(model, start), targets, settings)
 
 

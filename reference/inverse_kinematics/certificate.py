@@ -30,14 +30,7 @@ from ..model import Model, checked_model, coordinates_name
 from ..outcome import SentenceEnum
 from ..quaternion import conjugate, multiply
 from ..skeleton import Skeleton
-from .problem import (
-    CheckedTarget,
-    Target,
-    check_numbers,
-    check_single,
-    checked_settings,
-    checked_targets,
-)
+from .problem import CheckedTarget, Target, checked_settings, single_targets
 from .reach import UNIT, least_distance
 from .solve import solve_checked
 
@@ -133,7 +126,7 @@ def certify_ik(
             1e-6 from unit length, or an effector does not exist.
     """
     model = checked_model(model, "model")
-    targets = check_single(check_numbers(checked_targets(model, target, effector)))
+    targets = single_targets(model, target, effector)
     limits = (
         arguments.number("tolerance", tolerance, minimum=0.0),
         arguments.number("tolerance_rotation", tolerance_rotation, minimum=0.0),

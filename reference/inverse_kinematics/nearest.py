@@ -1,7 +1,6 @@
 """The solution nearest to the start, by the sum of squares or by the largest displacement."""
 
 import contextlib
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,8 +41,7 @@ def nearest_solution(
         raise ValueError("prefer: expected an Articulation or a Robot, got a Skeleton")
     check_single(targets)
     q = model.checked("q", arguments.floats("q", start, model.coordinate_count))
-    limits = settings.limits._replace(restarts=0, phases=1)
-    single_start = replace(settings, limits=limits)
+    single_start = settings.limited(restarts=0, phases=1)
     rng = np.random.default_rng(settings.seed)
     effectors, oriented = zip(*((t.joint, t.rotation is not None) for t in targets), strict=True)
     columns = prepare(model, effectors, oriented).mechanism.columns  # other joints stay as in q
@@ -60,9 +58,7 @@ def nearest_solution(
     if not len(candidates):
         return plain
     norms = np.linalg.norm(difference(model, candidates, q), order, axis=-1)
-    unmoved = replace(
-        single_start, limits=single_start.limits._replace(max_iterations=0, far_iterations=0)
-    )
+    unmoved = single_start.limited(max_iterations=0, far_iterations=0)
     solution = solve_checked(model, candidates[norms.argmin()], targets, unmoved)
     return solution._replace(iterations=int(np.sum(ends.iterations)) + plain.iterations)
 

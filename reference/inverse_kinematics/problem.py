@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, TypeGuard
 
 import numpy as np
@@ -172,6 +172,11 @@ def check_single(targets: list[CheckedTarget]) -> list[CheckedTarget]:
     return targets
 
 
+def single_targets(model: Any, target: Any, effector: Any) -> list[CheckedTarget]:
+    """Return the targets of a single pose, all numbers checked."""
+    return check_single(check_numbers(checked_targets(model, target, effector)))
+
+
 class IKSolver(NamedTuple):
     """A solver's two kernels; its pickle holds the name."""
 
@@ -211,6 +216,10 @@ class Settings:
     def numbers(self) -> FloatArray:
         """The limits as an array, for kernels."""
         return np.array(self.limits, dtype=np.float64)
+
+    def limited(self, **limits: Any) -> "Settings":
+        """Return the settings with some of its limits replaced."""
+        return replace(self, limits=self.limits._replace(**limits))
 
 
 def default_solver(model: Any, target: Any) -> tuple[str, int]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from .. import arguments, rotation
 from ..arguments import FloatArray, frozen
 from ..articulation import Articulation, joint_excess
-from ..inverse_kinematics.problem import Target, check_numbers, check_single, checked_targets
+from ..inverse_kinematics.problem import Target, single_targets
 from ..kinematics import forward_kinematics
 from ..model import Model, checked_model, coordinates_name
 from ..skeleton import Pose, Skeleton
@@ -116,7 +116,7 @@ def judge_pose(
             an effector does not exist, or a pose is needed but missing.
     """
     model = checked_model(model, "model")
-    targets = check_single(check_numbers(checked_targets(model, target, effector)))
+    targets = single_targets(model, target, effector)
     tree = model if isinstance(model, Skeleton) else model.skeleton
     x = None
     if positions is not None:
