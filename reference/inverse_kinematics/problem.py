@@ -55,8 +55,7 @@ class Target(_TargetFields):
         weight: float = 1.0,
     ) -> "Target":
         """Copy the arrays; the function that uses the target checks them."""
-        x = arguments.snapshot(position)
-        Q = arguments.snapshot(rotation)
+        x, Q = arguments.snapshot(position), arguments.snapshot(rotation)
         return super().__new__(cls, x, Q, effector, weight)
 
 

@@ -70,7 +70,7 @@ def solve_plain(
             row[3:7] = Q
     joints, coordinates = problem.joints, problem.coordinates
     end = 7 * joints + FIGURE_COUNT
-    memory = np.empty(end + coordinates + 1)  # see `result_on`
+    memory: Any = np.empty(end + coordinates + 1)  # see `result_on`
     if not kernel(problem.memory, settings.numbers, start, row, memory, 0, 1):
         return None
     if not is_skeleton:

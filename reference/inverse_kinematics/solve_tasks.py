@@ -204,14 +204,13 @@ def prepare_tasks(
     articulation = checked_model(model, "model")
     if not isinstance(articulation, Articulation):
         raise ValueError("model: expected an Articulation or a Robot, got a Skeleton")
+    phases = PHASES if phases is None else phases
     settings = (
         arguments.number("tolerance", tolerance, minimum=0.0),
         arguments.count("max_iterations", max_iterations, minimum=0),
         arguments.count("restarts", restarts, minimum=0),
         arguments.integer("seed", seed, minimum=0),
-        PHASES
-        if phases is None
-        else arguments.integer("phases", phases, minimum=1, below=PHASES + 1),
+        arguments.integer("phases", phases, minimum=1, below=PHASES + 1),
     )
     if isinstance(tasks, Target) or not isinstance(tasks, Sequence) or not tasks:
         raise ValueError(f"tasks: expected a list of at least one task, got {shown(tasks)}")
