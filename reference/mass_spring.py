@@ -227,11 +227,13 @@ class State(KeepsReadOnly):
         self._store(x.copy(), v.copy())
 
     def _store(self, positions: FloatArray, velocities: FloatArray) -> None:
-        self.__dict__.update(positions=frozen(positions), velocities=frozen(velocities))
+        positions.setflags(write=False)
+        velocities.setflags(write=False)
+        self.__dict__.update(positions=positions, velocities=velocities)
 
     @classmethod
     def of(cls, positions: FloatArray, velocities: FloatArray) -> "State":
-        """Return a state that shares these arrays, neither checked nor copied."""
+        """Return a state of these arrays, neither checked nor copied, which become read-only."""
         state = object.__new__(cls)
         state._store(positions, velocities)
         return state

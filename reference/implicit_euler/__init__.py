@@ -251,7 +251,7 @@ def _result(
         infinite = frozen(np.array([np.inf]))
         return StepResult(state, np.inf, 0, Outcome.DIVERGED, False, infinite, infinite)
     result = object.__new__(StepResult)  # in half the time of the constructor
-    residuals, objectives = history
+    residuals, objectives = history[0], history[1]
     result.__dict__.update(
         state=State.of(end[0], end[1]),
         residual=float(residuals[-1]),

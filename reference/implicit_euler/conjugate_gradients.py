@@ -76,16 +76,17 @@ def product_room(particles, springs):
 
 @relaxed
 @uncounted
-def linearised_step(start, terms, limit, room, step):
+def linearised_step(start, terms, roots, limit, room, step):
     """Fill in the step to the minimum of g with the springs linearised where they start.
 
-    `start` is of positions and the gradient, zero at the pins. Return whether the step came within
-    the tolerance in so many iterations.
+    `start` is of positions and the gradient, zero at the pins; `roots` are (h² k)^1/2 of the
+    springs. Return whether the step came within the tolerance in so many iterations.
     """
     (x, gradient), (rows, diagonals, lower, vectors) = start, room
-    h, _, (_, _, masses), springs, elastic, pinned = terms
+    _, _, (_, _, masses), springs, (rest_lengths, _, tension_only), pinned = terms
+    elastic = rest_lengths, roots, tension_only
     residual, solution = vectors[0], vectors[1]
-    add_blocks(x, h * h, masses, springs, elastic, pinned, rows, diagonals, lower)
+    add_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower)
     for i in range(len(x)):
         factorize_block(diagonals, lower, i)
         store_vector(residual, i, eliminate(diagonals, lower, i, load_vector(gradient, i)))
@@ -101,12 +102,12 @@ def linearised_step(start, terms, limit, room, step):
     return converged
 
 
-def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
+def add_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower):
     """Store (h² k)^1/2 u of each spring, zero if slack, in two rows; sum the diagonal blocks.
 
     A block has a diagonal xx, yy, zz, infinite at the pins, and yx, zx, zy below.
     """
-    rest_lengths, stiffnesses, tension_only = elastic
+    rest_lengths, roots, tension_only = elastic
     for i in range(len(x)):
         store_vector(diagonals, i, (masses[i], masses[i], masses[i]))
         store_vector(lower, i, (0.0, 0.0, 0.0))
@@ -115,7 +116,7 @@ def add_blocks(x, hh, masses, springs, elastic, pinned, rows, diagonals, lower):
     for s in range(len(springs)):
         length, u = spring_frame(x, at(springs[s, 0]), at(springs[s, 1]))
         slack = is_slack(length, rest_lengths[s], tension_only[s])
-        a = scale(0.0 if slack else math.sqrt(hh * stiffnesses[s]), u)
+        a = scale(0.0 if slack else roots[s], u)
         squares = a[0] * a[0], a[1] * a[1], a[2] * a[2]
         products = a[1] * a[0], a[2] * a[0], a[2] * a[1]
         for end in range(2):

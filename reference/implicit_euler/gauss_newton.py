@@ -10,6 +10,8 @@ gradients solve it where h² k is small beside the masses, and a factor elsewher
 in `conjugate_gradients` decides, once for a system and h. See docs/implicit_euler.md.
 """
 
+import functools
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -23,6 +25,7 @@ from ..sparse.multifrontal import eliminate_fronts
 from .conjugate_gradients import iteration_limit, linearised_step
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
+from .stopping import GO_ON
 from .terms import fill_gradient
 from .whole_step import (
     Iteration,
@@ -50,6 +53,11 @@ class GaussNewton:
         self.product_limit = limit
         self._memory = packed_model(*self._model, limit)
 
+    @functools.cached_property
+    def _factored(self) -> FloatArray:
+        """The model for a factor, where conjugate gradients do not suffice."""
+        return packed_model(*self._model, 0)
+
     def step(
         self, motion: Any, external: FloatArray, targets: FloatArray, *arguments: Any
     ) -> tuple[FloatArray, FloatArray, bool, int] | None:
@@ -57,7 +65,12 @@ class GaussNewton:
 
         The pull of pins that move belongs to the first iteration only.
         """
-        return None if len(targets) else _step(self._memory, motion, external, targets, *arguments)
+        if len(targets):
+            return None
+        end = _step(self._memory, motion, external, targets, *arguments)
+        if end[-1] == GO_ON:
+            end = _step(self._factored, motion, external, targets, *arguments)
+        return end
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
         """Yield x_n with the pins at their targets, then the iterate after each iteration.
@@ -71,22 +84,25 @@ class GaussNewton:
         while True:
             yield iterate
             start = x, gradient, iterate.value
-            end, found, _ = _iteration(self._memory, start, objective.terms, 0.0)
+            end, found, number = _iteration(self._memory, start, objective.terms, 0.0)
+            if number == math.inf:
+                end, found, _ = _iteration(self._factored, start, objective.terms, 0.0)
             if found:
                 iterate = objective.iterate_at(np.where(free, end[0], y))
                 x, gradient = iterate.positions, iterate.gradient
 
 
 def gauss_newton_iteration(model, buffers, start, terms, number):
-    """Fill in the end and return as an `Iteration` does; the last number has no meaning.
+    """Fill in the end and return as an `Iteration` does, infinity if a factor is needed.
 
     There is no end where the matrix is singular to rounding: the masses vanish beside h² k.
     """
     x, gradient, value = start
-    converged = model.product_limit > 0 and linearised_step(
-        (x, gradient), terms, model.product_limit, buffers.products, buffers.step
-    )
-    if not converged:
+    if model.product_limit > 0:
+        limit, room, step = model.product_limit, buffers.products, buffers.step
+        if not linearised_step((x, gradient), terms, model.roots, limit, room, step):
+            return (value, 0.0, 0.0), False, math.inf
+    else:
         fill_hessian(model, buffers, x, terms, False)
         if eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
             return (value, 0.0, 0.0), False, number

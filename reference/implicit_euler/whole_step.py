@@ -35,8 +35,8 @@ from .terms import (
 class Iteration(NamedTuple):
     """The kernels of a method."""
 
-    # (model, buffersspace, start, terms, shift) -> g, norm and reach of the end that it filled in,
-    # whether the end is better, and a number for the next iteration
+    # (model, buffers, start, terms, shift) -> g, norm and reach of the end that it filled in,
+    # whether the end is better, and a number for the next iteration, infinity to give up
     advance: Any
     refuses: Any  # (model, buffersspace, positions, terms) -> whether they are no minimum
 
@@ -46,6 +46,7 @@ class Model(NamedTuple):
 
     system: SystemArrays
     stiffnesses: np.ndarray  # k + c/h [N/m], (spring,)
+    roots: np.ndarray  # of h² times these [kg^1/2]
     free: np.ndarray  # whether each particle is, (particle,)
     places: np.ndarray  # of the blocks of springs in the Hessian; see `BlockSum`
     ends: np.ndarray
@@ -83,6 +84,7 @@ def packed_model(
         *blocks[:3],
         *updates[:2],
         separate.spring_sums,
+        h * np.sqrt(effective_stiffnesses(separate, h)),
     )
 
 
@@ -108,6 +110,7 @@ def model_in(memory):
     return Model(
         system,
         part(memory, 9, np.float64),
+        part(memory, 26, np.float64),
         part(memory, 10, np.bool_),
         pairs(part(memory, 11, np.int32), 4),
         pairs(part(memory, 12, np.int32), 2),
@@ -175,23 +178,24 @@ class Buffers(NamedTuple):
 
 
 def buffers_for(model, n):
-    """Return room for the iterations of n particles."""
-    pattern = model.factor
+    """Return room for the iterations of n particles, either for a factor or for products."""
+    pattern, factored = model.factor, model.product_limit == 0
+    rows = 3 * n if factored else 0
     return Buffers(
-        np.empty((len(model.places), 3, 3)),
-        np.empty(9 * model.starts[n]),
-        np.empty(3 * n),
-        np.empty(pattern.updates.entries),
-        scratch_for(pattern.blocks, pattern.updates, 3 * n),
-        np.zeros((3 * n, RIGHT_HAND_SIDES)),
-        np.empty((3 * n, REGISTER)),
-        np.empty((3 * n, RIGHT_HAND_SIDES)),
+        np.empty((len(model.places) if factored else 0, 3, 3)),
+        np.empty(9 * model.starts[n] if factored else 0),
+        np.empty(rows),
+        np.empty(pattern.updates.entries if factored else 0),
+        scratch_for(pattern.blocks, pattern.updates, rows),
+        np.zeros((rows, RIGHT_HAND_SIDES)),
+        np.empty((rows, REGISTER)),
+        np.empty((rows, RIGHT_HAND_SIDES)),
         np.empty((n, 3)),
         np.empty((n, 3)),
         np.empty((n, 3)),
         np.empty((n, 3)),
         (np.empty(n), np.empty(n)),
-        product_room(n if model.product_limit > 0 else 0, len(model.places)),
+        product_room(0 if factored else n, 0 if factored else len(model.places)),
     )
 
 
@@ -229,6 +233,8 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
             start = x, gradient, value
             end, found, shift = method.advance(model, buffers, start, terms, shift)
             convex = shift == 0.0 and before == 0.0
+            if shift == math.inf:
+                return count, at_floor, GO_ON
             if found:
                 value, norm, reach = end
     return count, at_floor, outcome
