@@ -5,6 +5,7 @@ until the sum is positive definite, a Levenberg shift in the metric of M. An end
 without a negative eigenvalue, which may cost a last factorisation.
 """
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -58,7 +59,8 @@ class Newton:
 def newton_iteration(model, buffers, start, terms, shift):
     """Fill in the end; return its g, norm and reach, whether it is better, and the shift.
 
-    The search for a shift begins below the last, which so decays when no longer needed.
+    The search for a shift begins below the last, which so decays when no longer needed. There is no
+    end where the shift overflows: the masses vanish beside h² K.
     """
     fill_hessian(model, buffers, start[0], terms, True)
     for i in range(len(model.diagonal)):
@@ -66,6 +68,8 @@ def newton_iteration(model, buffers, start, terms, shift):
     shift = shift / SHIFT_DECAY if shift > FIRST_SHIFT else 0.0
     while not is_factorised(model, buffers, shift):
         shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
+        if shift == math.inf:
+            return (start[2], 0.0, 0.0), False, shift
     fill_descent(model.factor, buffers, start[1])
     end, found = fill_end(
         start, buffers.step, terms, buffers.end, buffers.end_gradient, buffers.room

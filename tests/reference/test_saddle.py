@@ -164,3 +164,12 @@ def test_masses_that_vanish_beside_the_springs_are_named(solver, mass, stiffness
         ImplicitEuler(system, h=step, solver=solver)
     assert f"{mass:g} kg" in str(error.value)
     assert f"{stiffness * step**2:g} kg" in str(error.value)
+
+
+def test_masses_that_vanish_beside_the_stiffness_end_the_search_for_a_shift(backend):
+    """The compressed spring needs more than 1e308 times the masses."""
+    system = MassSpring([1e-75, 1e-75], [[0, 1]], 1e75, 1e75, gravity=(0, 0, 0))
+    state = State([[0, 0, 0], [1e-140, 0, 0]], np.zeros((2, 3)))
+    result = ImplicitEuler(system, h=1.0).step(state)
+    assert result.outcome is Outcome.STALLED
+    np.testing.assert_array_equal(result.state.positions, state.positions)
