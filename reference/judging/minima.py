@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import SMALLEST_POSITIVE, FloatArray
+from ..arguments import LARGEST_COORDINATE, SMALLEST_POSITIVE, FloatArray
 from ..implicit_euler import STEP_SOLVERS, ImplicitEuler
 from ..implicit_euler.certificate import Certificate, certify
 from ..mass_spring import MassSpring, State
@@ -97,12 +97,12 @@ class Minima:
 
     @np.errstate(over="ignore", invalid="ignore")
     def _newton_from(self, x: FloatArray) -> FloatArray | None:
-        """Return the last iterate of Newton's method from x, None if it overflows."""
+        """Return the last iterate of Newton's method from x, None if it leaves the numbers."""
         objective = copy.copy(self.objective)
         objective.start = last = objective.iterate_at(x)
         newton = STEP_SOLVERS["newton"](objective.system, objective.h)
         for count, iterate in enumerate(newton.iterates(objective)):
-            if not iterate.finite:
+            if not (iterate.finite and np.abs(iterate.positions).max() <= LARGEST_COORDINATE):
                 return None
             is_rounding = iterate.at_floor and iterate.gradient_norm >= last.gradient_norm
             if count and (is_rounding or iterate is last or count == MAX_ITERATIONS):

@@ -177,3 +177,11 @@ def test_at_rest_only_the_rest_itself_is_without_error():
     system, state = scenes.hanging_rope(particles=4, gravity=0.0)
     assert judge_step(system, state, h, state.positions).error == 0
     assert judge_step(system, state, h, state.positions + 1e-6).error == math.inf
+
+
+def test_a_limit_beyond_all_numbers_is_no_minimiser():
+    """The force moves the particle by 1e82 m."""
+    system, force = MassSpring([1.0], [], 1.0, 1.0), np.full((1, 3), 1e70)
+    state = State(np.zeros((1, 3)), np.zeros((1, 3)))
+    found = judge_step(system, state, 1e6, state.positions, external_forces=force)
+    assert (found.outcome, found.error) == (Outcome.DIVERGED, math.inf)
