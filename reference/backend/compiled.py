@@ -118,7 +118,15 @@ class Kernel:
         if _backend.get() == "python":
             with np.errstate(all="ignore"):
                 return self.plain(*arguments)
-        return self.compiled(*arguments)
+        try:
+            return self.compiled(*arguments)
+        except SystemError as error:  # a signal, such as Ctrl-C, came while numba made the result
+            raise _cause(error) from None
+
+
+def _cause(error: BaseException) -> BaseException:
+    """Return the exception at the beginning of a chain of causes."""
+    return error if error.__cause__ is None else _cause(error.__cause__)
 
 
 @functools.cache

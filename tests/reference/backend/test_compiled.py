@@ -1,7 +1,9 @@
 import math
+import signal
 import subprocess
 import sys
 import textwrap
+import threading
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -305,3 +307,20 @@ def test_with_numbas_compiler_off_the_interpreter_runs_every_kernel(monkeypatch)
     monkeypatch.undo()
     compiled.compile_kernel.cache_clear()
     assert compiled.Kernel(total).compiled is not total
+
+
+def counted(n):
+    values = np.zeros(n)
+    for _ in range(n):
+        for i in range(n):
+            values[i] += values[i - 1]
+    return values, values[:1].copy()
+
+
+def test_a_signal_during_a_kernel_is_what_its_handler_raises():
+    """Where numba makes a tuple of arrays of the result, it is the cause of a SystemError."""
+    kernel = compiled.Kernel(counted)
+    kernel(1)
+    threading.Timer(0.05, signal.raise_signal, [signal.SIGINT]).start()
+    with pytest.raises(KeyboardInterrupt):
+        kernel(20_000)
