@@ -34,6 +34,8 @@ from .quaternion import add, dot, load_vector, scale, store_vector, subtract
 
 # With more steps the start of an implicit step would take as long as the step.
 MOST_STEPS = 1000
+# Steps times particles and springs in a call of a kernel, about 0.1 s, which no signal interrupts.
+WORK = 10**7
 # Of each stage of a Runge-Kutta step: how far the next stage lies along its rates, in steps, and
 # how much the rates count.
 STAGES = ((0.5, 1.0 / 6.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 3.0), (0.0, 1.0 / 6.0))
@@ -131,10 +133,15 @@ def _advanced(
         with np.errstate(over="ignore"):
             v[system.pinned] = (targets - x[system.pinned]) / (steps * h)
     constant = constant_forces(system, external_forces)
-    if not _INTEGRATORS[integrator](x, v, h, steps, constant, system.arrays):
-        raise FloatingPointError(
-            f"{integrator}: the steps left the numbers up to {LARGEST_COORDINATE:g}; h is too large"
-        )
+    at_once = 1 if steps == 1 else 1 + WORK // (len(x) + len(system.springs))
+    while steps > 0:
+        count = steps if steps < at_once else at_once
+        steps -= count
+        if not _INTEGRATORS[integrator](x, v, h, count, constant, system.arrays):
+            raise FloatingPointError(
+                f"{integrator}: the steps left the numbers up to {LARGEST_COORDINATE:g}; "
+                "h is too large"
+            )
     if pin_positions is not None:
         x[system.pinned] = targets
     return State.of(x, v)

@@ -1,5 +1,8 @@
 """Laws of the explicit integrators."""
 
+import signal
+import threading
+
 import numpy as np
 import pytest
 
@@ -208,3 +211,17 @@ def test_symplectic_euler_keeps_the_energy_over_ten_thousand_steps():
         state = symplectic_euler(system, state, 0.01, steps=1000)
         energies.append(kinetic_energy(system, state) + potential_energy(system, state.positions))
     np.testing.assert_allclose(energies, 0.5, rtol=0.011)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_signal_interrupts_many_steps(integrator, monkeypatch):
+    """They are made in several calls of a kernel, with the same bits as in one."""
+    system, state = oscillator()
+    whole = integrator(system, state, 0.01, steps=100)
+    monkeypatch.setattr(explicit, "WORK", 21)
+    parts = integrator(system, state, 0.01, steps=100)
+    np.testing.assert_array_equal(parts.positions, whole.positions)
+    np.testing.assert_array_equal(parts.velocities, whole.velocities)
+    threading.Timer(0.05, signal.raise_signal, [signal.SIGINT]).start()
+    with pytest.raises(KeyboardInterrupt):
+        integrator(system, state, 0.01, steps=10**15)
