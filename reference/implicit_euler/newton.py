@@ -69,7 +69,7 @@ def newton_iteration(model, buffers, start, terms, shift):
     while not is_factorised(model, buffers, shift):
         shift = max(FIRST_SHIFT, SHIFT_GROWTH * shift)
         if shift == math.inf:
-            return (start[2], 0.0, 0.0), False, shift
+            return (start[2], 0.0, 0.0), False, FIRST_SHIFT
     fill_descent(model.factor, buffers, start[1])
     end, found = fill_end(
         start, buffers.step, terms, buffers.end, buffers.end_gradient, buffers.room
