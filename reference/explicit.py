@@ -138,10 +138,8 @@ def _advanced(
         count = steps if steps < at_once else at_once
         steps -= count
         if not _INTEGRATORS[integrator](x, v, h, count, constant, system.arrays):
-            raise FloatingPointError(
-                f"{integrator}: the steps left the numbers up to {LARGEST_COORDINATE:g}; "
-                "h is too large"
-            )
+            left = f"the steps left the numbers up to {LARGEST_COORDINATE:g}; h is too large"
+            raise FloatingPointError(f"{integrator}: {left}")
     if pin_positions is not None:
         x[system.pinned] = targets
     return State.of(x, v)

@@ -121,12 +121,10 @@ class Kernel:
         try:
             return self.compiled(*arguments)
         except SystemError as error:  # a signal, such as Ctrl-C, came while numba made the result
-            raise _cause(error) from None
-
-
-def _cause(error: BaseException) -> BaseException:
-    """Return the exception at the beginning of a chain of causes."""
-    return error if error.__cause__ is None else _cause(error.__cause__)
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            raise cause from None
 
 
 @functools.cache
