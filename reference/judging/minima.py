@@ -76,7 +76,9 @@ class Minima:
         return min(self.known or [self.newton], key=lambda minimum: minimum.value)
 
     def excess(self, x: FloatArray, base: Minimum) -> float:
-        """Return (g(x) - g*) / (g(y) - g*) with g* at the base."""
+        """Return (g(x) - g*) / (g(y) - g*) with g* at the base, infinity if none is known."""
+        if not self.known:
+            return math.inf
         height = self.objective.inertial.value - base.value
         above = self.objective.iterate_at(x).value - base.value
         return above / height if height > 0.0 else 0.0 if above <= 0.0 else math.inf
