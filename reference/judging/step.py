@@ -30,7 +30,7 @@ class StepJudgement:
         error: |x - x*| / |y - x*|; 0 if both distances are 0, infinite if only |y - x*| is, or if
             Newton's method found no x*.
         excess: (g(x) - g*) / (g(y) - g*), over the free particles, with g* the lowest of the known
-            minima; infinite if only g(y) - g* is 0.
+            minima; infinite if only g(y) - g* is 0, or no minimum is known.
         distance: |x - x*| over all coordinates [m].
         displacement: |y - x*| over all coordinates [m].
         pin_displacement: the largest distance of a pinned particle from its position at the end of
