@@ -36,8 +36,8 @@ from .quaternion import add, dot, load_vector, scale, store_vector, subtract
 MOST_STEPS = 1000
 # Steps times particles and springs in a call of a kernel, about 0.1 s, which no signal interrupts.
 WORK = 10**7
-# Of each stage of a Runge-Kutta step: how far the next stage lies along its rates, in steps, and
-# how much the rates count.
+# Two numbers for each stage of a Runge-Kutta step: the distance to the next stage along the rates
+# of this stage, in steps, and the weight of these rates.
 STAGES = ((0.5, 1.0 / 6.0), (0.5, 1.0 / 3.0), (1.0, 1.0 / 3.0), (0.0, 1.0 / 6.0))
 
 
@@ -103,9 +103,9 @@ def explicit_positions(
 def stable_steps(system: MassSpring, h: float) -> float:
     """Return how many steps of symplectic Euler through h [s] are stable.
 
-    Without rest lengths and dampers a step is stable for a frequency w if its length times w is at
-    most 2, with a damping rate d if (w h)² + 2 d h <= 4. Both are at most the Gershgorin bounds of
-    M^-1 times the graph Laplacians of k and of c.
+    A step of length s is stable for a frequency w and a damping rate d if (w s)² + 2 d s <= 4.
+    Without rest lengths, w² and d are at most the Gershgorin bounds of M^-1 times the graph
+    Laplacians of k and of c. The result is the least n for s = h / n.
     """
     ends, free = system.springs.ravel(), system.free
     rates = []
@@ -125,7 +125,7 @@ def _advanced(
     pin_positions: ArrayLike | None,
     steps: int,
 ) -> State:
-    """Return the checked state after all steps, with the pins exactly at their targets."""
+    """Check the arguments; return the state after all steps, pins exactly at their targets."""
     h, steps = number("h", h, above=0), integer("steps", steps, minimum=1)
     x, v = checked_state(system, state)
     if pin_positions is not None:
@@ -146,7 +146,10 @@ def _advanced(
 
 
 def symplectic_euler_steps(x, v, h, steps, constant, system):
-    """Make steps of symplectic Euler in place, pins at their velocities; return `are_bounded`."""
+    """Make steps of symplectic Euler in place, pins at their velocities; return `are_bounded`.
+
+    Rows of four numbers have capital names; the fourth number is zero and fills a register.
+    """
     X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
     springs = springs_in_lanes(system)
     for _ in range(steps):
@@ -162,7 +165,10 @@ def symplectic_euler_steps(x, v, h, steps, constant, system):
 
 
 def runge_kutta_steps(x, v, h, steps, constant, system):
-    """Make steps of the Runge-Kutta method in place, as `symplectic_euler_steps` does."""
+    """Make steps of the Runge-Kutta method in place, as `symplectic_euler_steps` does.
+
+    x and v stay at the start of a step while X and V sum the rates of its stages.
+    """
     X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
     springs = springs_in_lanes(system)
     for _ in range(steps):
@@ -206,7 +212,10 @@ def add_pulls_in_lanes(x, v, system, springs, total):
 
 
 def springs_in_lanes(system):
-    """Return the least stretch of each spring, whether any may be slack, whether any is damped."""
+    """Return the least stretch of each spring [m], and whether any spring may be slack, is damped.
+
+    The least stretch is 0 for a tension-only spring, otherwise minus infinity.
+    """
     ropes = system.tension_only
     return np.where(ropes, 0.0, -np.inf), ropes.any(), system.dampings.any()
 
@@ -218,10 +227,10 @@ def rows_of(vectors):
     return rows
 
 
-def overwrite(vectors, others):
-    """Copy vectors, (particle, 3), or rows of four."""
-    for i in range(len(vectors)):
-        store_vector(vectors, i, load_vector(others, i))
+def overwrite(target, source):
+    """Copy the vectors of the source, (particle, 3) or rows of four, into the target."""
+    for i in range(len(target)):
+        store_vector(target, i, load_vector(source, i))
 
 
 def are_bounded(x, v):

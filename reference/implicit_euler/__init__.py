@@ -54,7 +54,8 @@ STEP_SOLVERS: dict[str, type[StepMethod]] = {
 }
 
 OUTCOMES = tuple(Outcome)
-# No positions of pins, no positions to begin at; read-only, as those of states are.
+# Stands for no positions of pins and no start. Read-only as the arrays of states are: a kernel is
+# compiled again for arguments of another type.
 NOWHERE = frozen(np.empty((0, 3)))
 # Positions and velocities at the end of a step, (2, particle, 3); residuals and values of g before
 # and after each iteration, (2, iterations + 1), none on overflow; whether the gradient is at the
@@ -94,12 +95,14 @@ class ImplicitEuler:
     Attributes:
         system: particles and springs.
         h: the step [s].
-        solver: a name in `STEP_SOLVERS`.
+        solver: a name in `STEP_SOLVERS`: "newton", "newton_cg", "gauss_newton", "local_global",
+            "chebyshev" or "lbfgs".
         tolerance: residual to stop at; 0 runs all iterations.
         max_iterations: most iterations in a step; None means the solver's default.
         start: first iterate, "y", "x_n", or "explicit", the positions after h by stable steps of
-            symplectic Euler, which save iterations on stiff systems (y if they are more than
-            1,000). None means y for all but gauss_newton, which starts at x_n by definition.
+            symplectic Euler, or y if more than 1,000 steps were needed. An explicit start saves
+            iterations on stiff systems. None means y for all solvers but gauss_newton, which starts
+            at x_n by definition.
             Residuals are relative to y in all cases.
     """
 
@@ -197,7 +200,10 @@ class ImplicitEuler:
     def _in_one_kernel(
         self, state: State, external_forces: ArrayLike | None, pin_positions: ArrayLike | None
     ) -> StepEnd | None:
-        """Return the end of a step by `step_by`, None if the solver does not step so."""
+        """Return the end of a step by `step_by`, or None if the solver has no such kernel.
+
+        Newton has it; so has GaussNewton while pins stay.
+        """
         if not isinstance(self._solver, Newton | GaussNewton):
             return None
         system = self.system

@@ -25,16 +25,17 @@ from ..sparse import CholeskyFactor
 from .objective import effective_stiffnesses
 from .terms import EPS
 
-# Of the scaled residual relative to the scaled gradient. Rounding errors of the gradient's sums of
-# four or more terms are as large.
+# Scaled residual relative to the scaled gradient. The gradient itself has such a rounding error, as
+# a sum of four or more terms for each particle.
 TOLERANCE = 4 * EPS
-# Multiplications of a product with the scaled matrix for each spring; and how many take as long as
-# assembling and solving with a factor takes for each unknown, measured on ropes and cloths.
+# Multiplications of a product with the scaled matrix for each spring. For each unknown, the number
+# of multiplications that take as long as assembly and triangular solves, measured on ropes and
+# cloths.
 SPRING_MULTIPLICATIONS, UNKNOWN_MULTIPLICATIONS = 12, 2000
 
 
 def iteration_limit(system: MassSpring, h: float, factor: CholeskyFactor) -> int:
-    """Return the iterations that a step may take, 0 where a factor is expected to be faster.
+    """Return the most iterations of a step, 0 where a factor is expected to be faster.
 
     `factor` has the pattern of the matrix. The rule is stated in docs/implicit_euler.md.
     """
@@ -60,11 +61,11 @@ def iteration_bound(system: MassSpring, h: float) -> float:
 
 
 class ProductRoom(NamedTuple):
-    """What conjugate gradients write to; the fourth numbers of rows stay zero."""
+    """Workspace of conjugate gradients; the fourth number of each row stays zero."""
 
-    rows: np.ndarray  # two of four numbers for each spring
-    diagonals: np.ndarray  # (particle, 3)
-    lower: np.ndarray  # (particle, 3)
+    rows: np.ndarray  # a and b of each spring, (2 spring, 4)
+    diagonals: np.ndarray  # the diagonals of the L_i, inverted, (particle, 3)
+    lower: np.ndarray  # the entries yx, zx, zy of the L_i, (particle, 3)
     vectors: np.ndarray  # residual, solution, direction and product, (4, particle, 4)
 
 
@@ -77,10 +78,10 @@ def product_room(particles, springs):
 @relaxed
 @uncounted
 def linearised_step(start, terms, roots, limit, room, step):
-    """Fill in the step to the minimum of g with the springs linearised where they start.
+    """Fill in the step to the minimum of g with the springs linearised at the start.
 
     `start` is of positions and the gradient, zero at the pins; `roots` are (h² k)^1/2 of the
-    springs. Return whether the step came within the tolerance in so many iterations.
+    springs. Return whether at most `limit` iterations bring the residual within the tolerance.
     """
     (x, gradient), (rows, diagonals, lower, vectors) = start, room
     _, _, (_, _, masses), springs, (rest_lengths, _, tension_only), pinned = terms

@@ -49,7 +49,7 @@ class GaussNewton:
         self.limit_products(iteration_limit(system, h, self._analysed))
 
     def limit_products(self, limit: int) -> None:
-        """Let conjugate gradients take so many iterations before a factor is made, 0 for none."""
+        """Make a factor if conjugate gradients need more than `limit` iterations; 0 for none."""
         self.product_limit = limit
         self._memory = packed_model(*self._model, limit)
 
@@ -61,9 +61,9 @@ class GaussNewton:
     def step(
         self, motion: Any, external: FloatArray, targets: FloatArray, *arguments: Any
     ) -> tuple[FloatArray, FloatArray, bool, int] | None:
-        """Return what `step_by` returns, of its arguments after the first two; None if pins move.
+        """Return the result of `step_by` for its arguments after the first two; None if pins move.
 
-        The pull of pins that move belongs to the first iteration only.
+        Moving pins pull in the first iteration only, see `iterates`; the kernel has no such case.
         """
         if len(targets):
             return None
@@ -92,10 +92,10 @@ class GaussNewton:
                 x, gradient = iterate.positions, iterate.gradient
 
 
-def gauss_newton_iteration(model, buffers, start, terms, number):
+def gauss_newton_iteration(model, buffers, start, terms, shift):
     """Fill in the end and return as an `Iteration` does, infinity if a factor is needed.
 
-    There is no end where the matrix is singular to rounding: the masses vanish beside h² k.
+    No end is accepted where the matrix is singular to rounding: the masses vanish beside h² k.
     """
     x, gradient, value = start
     if model.product_limit > 0:
@@ -105,11 +105,11 @@ def gauss_newton_iteration(model, buffers, start, terms, number):
     else:
         fill_hessian(model, buffers, x, terms, False)
         if eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
-            return (value, 0.0, 0.0), False, number
+            return (value, 0.0, 0.0), False, shift
         fill_descent(model.factor, buffers, gradient)
     for i in range(len(x)):
         store_vector(buffers.end, i, add(load_vector(x, i), load_vector(buffers.step, i)))
-    return fill_gradient(buffers.end, terms, buffers.end_gradient), True, number
+    return fill_gradient(buffers.end, terms, buffers.end_gradient), True, shift
 
 
 def never(model, buffers, x, terms):

@@ -1,8 +1,9 @@
 """Newton's method on g with its exact Hessian, a whole step in one kernel.
 
 Where springs are compressed the Hessian M + h² K may be indefinite. A multiple of M is then added
-until the sum is positive definite, a Levenberg shift in the metric of M. An end is accepted only
-without a negative eigenvalue, which may cost a last factorisation.
+until the sum is positive definite, a Levenberg shift in the metric of M (Nocedal & Wright 2006,
+section 3.4). The search ends only without a negative eigenvalue, which may take a last
+factorisation.
 """
 
 import math
@@ -26,8 +27,9 @@ from .whole_step import (
     step_by,
 )
 
-# Shifts of an indefinite Hessian, times M. Growth outruns decay, for few factorisations. Near a
-# minimum there is no shift, so none changes the limit of a converging search.
+# Shifts of an indefinite Hessian, as multiples of M. Growth outruns decay, for few factorisations.
+# The first shift is small beside M: a slightly indefinite Hessian changes little. Near a minimum
+# the Hessian is positive definite without a shift, so convergence stays quadratic.
 FIRST_SHIFT = 1e-2
 SHIFT_GROWTH, SHIFT_DECAY = 4.0, 2.0
 
@@ -39,11 +41,12 @@ class Newton:
 
     def __init__(self, system: MassSpring, h: float) -> None:
         """Analyse the pattern, and pack the system with it."""
+        # The attribute keeps the analysis in the cache for other integrators of the system.
         self._analysed = hessian_factor(system)
         self._memory = packed_model(system, h, self._analysed.pattern)
 
     def step(self, *arguments: Any) -> tuple[FloatArray, FloatArray, bool, int]:
-        """Return what `step_by` returns, of its arguments after the first two."""
+        """Return the result of `step_by` for its arguments after the first two."""
         return _step(self._memory, *arguments)
 
     def iterates(self, objective: Objective) -> Iterator[Iterate]:
@@ -57,10 +60,10 @@ class Newton:
 
 
 def newton_iteration(model, buffers, start, terms, shift):
-    """Fill in the end; return its g, norm and reach, whether it is better, and the shift.
+    """Fill in the end and return as an `Iteration` does.
 
-    The search for a shift begins below the last, which so decays when no longer needed. There is no
-    end where the shift overflows: the masses vanish beside h² K.
+    The search for a shift begins below the last shift, so shifts decay when no longer needed. There
+    is no end where the shift overflows: the masses vanish beside h² K.
     """
     fill_hessian(model, buffers, start[0], terms, True)
     for i in range(len(model.diagonal)):
@@ -78,7 +81,7 @@ def newton_iteration(model, buffers, start, terms, shift):
 
 
 def is_factorised(model, buffers, shift):
-    """Factorise the Hessian plus a multiple of M; return whether the sum is positive definite."""
+    """Factorise the Hessian plus `shift` times M; return whether the sum is positive definite."""
     for i in range(len(model.diagonal)):
         buffers.data[model.diagonal[i]] = buffers.unshifted[i] + shift * model.masses[i]
     return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) < 0

@@ -26,9 +26,11 @@ from .factor_cache import GlobalMatrixSolver
 from .line_search import inner_product, line_search
 from .objective import Iterate, Objective
 
-LARGEST_TOLERANCE = 0.1  # of the error of a step, relative to the step
-TOLERANCE_FACTOR = 0.3  # times the square root of the relative gradient
-# A step ended here is still a direction of descent, for the line search to shorten.
+# Residual of the Newton system relative to the gradient, in the norm of the preconditioner's
+# inverse. The step is then about as accurate, relative to its length.
+LARGEST_TOLERANCE = 0.1
+TOLERANCE_FACTOR = 0.3  # times the square root of |grad g(x)| / |grad g(y)|
+# A step truncated here is still a direction of descent, which the line search shortens.
 CG_ITERATION_LIMIT = 500
 
 
@@ -73,19 +75,22 @@ class NewtonCG(GlobalMatrixSolver):
 
 
 class CGVectors(NamedTuple):
-    """Memory for the steps of an objective: fresh memory takes longer than the arithmetic."""
+    """Memory for the steps of an objective: fresh memory takes longer than the arithmetic.
 
-    blocks: FloatArray  # of the springs, see `factored_blocks`
-    unknowns: FloatArray  # of the factor
-    s: FloatArray
-    r: FloatArray
-    z: FloatArray
-    p: FloatArray
+    Vectors have shape (particle, 3).
+    """
+
+    blocks: FloatArray  # of the springs, see `factored_blocks`, (spring, 4)
+    unknowns: FloatArray  # workspace of solves with the factor, (particle, 4)
+    s: FloatArray  # the step
+    r: FloatArray  # the residual -grad g - H s
+    z: FloatArray  # the residual times the preconditioner's inverse
+    p: FloatArray  # the direction
     Hp: FloatArray
 
     @classmethod
     def of(cls, system: MassSpring) -> "CGVectors":
-        """Return memory for the vectors of a system, each of shape (particle, 3)."""
+        """Return memory for the vectors of a system."""
         blocks, n = np.empty((len(system.springs), 4)), system.particle_count
         return cls(blocks, np.empty((n, 4)), *np.empty((5, n, 3)))
 
@@ -121,7 +126,7 @@ def hessian_product(blocks, p, masses, springs, pinned, product):
 
 
 def update(length, p, Hp, s, r):
-    """Add a multiple of p to s, and subtract it of H p from r."""
+    """Add `length` times p to s, and subtract `length` times H p from r."""
     for i in range(len(p)):
         for c in range(3):
             s[i, c] += length * p[i, c]

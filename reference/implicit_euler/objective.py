@@ -51,7 +51,8 @@ class Iterate:
     value: float  # g(x) [kg m²]
     gradient_norm: float  # |grad g(x)|
     floor_bound: float  # an upper bound of `floor` that is cheaper to compute
-    rounding_of: Callable[[FloatArray], tuple[float, float]]  # of the norm and of g at x
+    # bounds on the rounding errors of |grad g(x)| and of g(x), from x
+    rounding_of: Callable[[FloatArray], tuple[float, float]]
 
     @functools.cached_property
     def _rounding(self) -> tuple[float, float]:
@@ -69,7 +70,7 @@ class Iterate:
 
     @property
     def finite(self) -> bool:
-        """Whether g, its gradient and the terms of the floor are finite."""
+        """Whether g, its gradient and the squared terms of the floor are finite."""
         return is_finite(self.value, self.gradient_norm, self.floor_bound)
 
     @property
@@ -121,7 +122,7 @@ class Objective:
         effective: the system with its dampers replaced by springs, as above; the dampers of
             tension-only springs follow all other springs.
         inertial: the iterate at y, to which residuals are relative.
-        terms: the arguments of kernels after the positions.
+        terms: the arguments of kernels after the positions, see `terms`.
     """
 
     def __init__(

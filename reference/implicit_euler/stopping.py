@@ -23,9 +23,9 @@ CONVERGED, STALLED, ITERATION_LIMIT, DIVERGED, AT_ROUNDING, SADDLE = map(
 def outcome_at(count, stop, residual, best, stuck, at_floor, at_rest):
     """Return the outcome after `count` iterations or GO_ON, and whether no iteration could follow.
 
-    `stop` is the tolerance and the limit of iterations.
-    `best` is the iteration of the least residual; a solver is stuck if it could not improve its
-    last iterate. The floor is an upper bound, often a thousand times the actual rounding error. A
+    `stop` is the tolerance and the limit of iterations, `best` the iteration of the least residual.
+    A solver is stuck if it could not improve its last iterate. `Iterate` defines at_floor and
+    at_rest. The floor is an upper bound, often a thousand times the actual rounding error. A
     gradient below the floor therefore stops the solver only if the start is at rest, or once the
     least residual is no longer improved.
     """

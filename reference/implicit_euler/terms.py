@@ -1,7 +1,13 @@
 """Kernels for the terms of g: value, gradient, effective dampers and rounding errors.
 
-All arguments are in SI units; `objective` defines g. Groups of arrays are plain tuples: `particles`
-of y, external forces and masses, `elastic` of rest lengths, stiffnesses and tension_only.
+All arguments are in SI units; `objective` defines g. Plain tuples group them:
+
+    terms = h, constant, particles, springs, elastic, pinned
+    particles = y, external forces, masses
+    elastic = rest lengths, stiffnesses, tension_only
+
+Springs are effective, with dampers included; `constant` is the energy [J] that this leaves out of
+E. The external forces include gravity. `hh` stands for h². `reach` is the largest |x_i|.
 """
 
 import math
@@ -38,11 +44,11 @@ def inertial_positions(x_n, v_n, h, pinned, targets):
     return y
 
 
-def move_free(x, x_n, free):
-    """Move the free particles of x to x_n."""
+def move_free(x, begin, free):
+    """Move the free particles of x to where they begin."""
     for i in range(len(x)):
         if free[i]:
-            store_vector(x, i, load_vector(x_n, i))
+            store_vector(x, i, load_vector(begin, i))
 
 
 def step_end(x_n, x, h, history):
@@ -60,7 +66,7 @@ def step_end(x_n, x, h, history):
 
 
 def is_finite(value, gradient_norm, floor_bound):
-    """Return whether g, the norm of its gradient and the terms of the floor are finite."""
+    """Return whether g, the norm of its gradient and the squared terms of the floor are finite."""
     terms = floor_bound / SUM_ROUNDING
     return math.isfinite(value + gradient_norm + terms * terms)
 

@@ -35,10 +35,11 @@ from .terms import (
 class Iteration(NamedTuple):
     """The kernels of a method."""
 
-    # (model, buffers, start, terms, shift) -> g, norm and reach of the end that it filled in,
-    # whether the end is better, and a number for the next iteration, infinity to give up
+    # (model, buffers, start, terms, shift) -> (g, |grad g| and the largest |x_i| of the end, which
+    # it fills in), whether the end is accepted, the shift for the next iteration, infinity to give
+    # up. `start` is of positions, gradient and g.
     advance: Any
-    refuses: Any  # (model, buffersspace, positions, terms) -> whether they are no minimum
+    refuses: Any  # (model, buffers, positions, terms) -> whether the positions are no minimum
 
 
 class Model(NamedTuple):
@@ -46,18 +47,20 @@ class Model(NamedTuple):
 
     system: SystemArrays
     stiffnesses: np.ndarray  # k + c/h [N/m], (spring,)
-    roots: np.ndarray  # of h² times these [kg^1/2]
-    free: np.ndarray  # whether each particle is, (particle,)
-    places: np.ndarray  # of the blocks of springs in the Hessian; see `BlockSum`
+    roots: np.ndarray  # (h² (k + c/h))^1/2 [kg^1/2], (spring,)
+    free: np.ndarray  # whether each particle is free, (particle,)
+    # The pattern of the Hessian, see `BlockSum`: the places of the four blocks of each spring,
+    # (spring, 4); its ends, -1 for a pin, (spring, 2); where columns begin, (particle + 1,).
+    places: np.ndarray
     ends: np.ndarray
     starts: np.ndarray
-    diagonal: np.ndarray  # the places of the diagonal, (3 particle,)
-    masses: np.ndarray  # on the diagonal, (3 particle,)
-    sums: np.ndarray  # see `sum_springs`; of undamped springs
+    diagonal: np.ndarray  # the places of the diagonal in the data of the Hessian, (3 particle,)
+    masses: np.ndarray  # on the diagonal [kg], 1 at the pins, (3 particle,)
+    sums: np.ndarray  # see `sum_springs`, dampers left out, (particle, 2)
     factor: SymbolicFactor
     damped: bool
-    most_springs: int  # of a particle
-    product_limit: int  # iterations of conjugate gradients in a linearised step
+    most_springs: int  # the most springs of a particle
+    product_limit: int  # most iterations of conjugate gradients in a linearised step, 0 for none
 
 
 def packed_model(
@@ -133,8 +136,8 @@ def pairs(values, count):
 def step_by(method, memory, motion, external, targets, begin, h, stop):
     """Make a step of implicit Euler by a method.
 
-    `motion` is x_n and v_n; `targets` are the positions of the pins at the end of the step, none if
-    they stay; `begin` is where the free particles begin, empty for y; `stop` is the tolerance and
+    `motion` is x_n and v_n. `targets` are the positions of the pins at the end of the step, none if
+    pins stay. `begin` is where the free particles begin, empty for y. `stop` is the tolerance and
     the limit of iterations.
 
     Returns:
@@ -161,24 +164,25 @@ def step_by(method, memory, motion, external, targets, begin, h, stop):
 class Buffers(NamedTuple):
     """What an iteration writes to."""
 
-    blocks: np.ndarray  # of the springs, (spring, 3, 3)
-    data: np.ndarray  # of the Hessian
-    unshifted: np.ndarray  # its diagonal, (3 particle,)
-    values: np.ndarray  # of the factor
+    blocks: np.ndarray  # h² times the stiffness of each spring [kg], (spring, 3, 3)
+    data: np.ndarray  # the entries of the Hessian
+    unshifted: np.ndarray  # the diagonal of the Hessian, (3 particle,)
+    values: np.ndarray  # the entries of the factor
     scratch: Scratch
+    # A solve with the factor always has three right-hand sides, here a gradient and two zeros.
     right: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
     unknowns: np.ndarray  # (3 particle, REGISTER)
     solution: np.ndarray  # (3 particle, RIGHT_HAND_SIDES)
-    gradient: np.ndarray  # all of (particle, 3)
-    step: np.ndarray
-    end: np.ndarray
-    end_gradient: np.ndarray
+    gradient: np.ndarray  # at the iterate, (particle, 3)
+    step: np.ndarray  # from the iterate to the end, (particle, 3)
+    end: np.ndarray  # positions after the iteration, (particle, 3)
+    end_gradient: np.ndarray  # (particle, 3)
     room: tuple[np.ndarray, np.ndarray]  # see `rounding_sums`
     products: ProductRoom
 
 
 def buffers_for(model, n):
-    """Return room for the iterations of n particles, either for a factor or for products."""
+    """Return buffers for the iterations of n particles, either for a factor or for products."""
     pattern, factored = model.factor, model.product_limit == 0
     rows = 3 * n if factored else 0
     return Buffers(
@@ -202,8 +206,9 @@ def buffers_for(model, n):
 def minimise(method, model, buffers, start, terms, floor, history, stop):
     """Iterate until `outcome_at` says so; return the number of iterations, at_floor, the outcome.
 
-    `start` is of the positions to begin at, and of x, which is y and becomes the end. `floor` is of
-    the coefficients of the floor. The number of iterations is -1 if the start overflows.
+    `start` is of the positions to begin at, and of x, which is y and becomes the end. `floor` holds
+    the two `rounding_coefficients`. The number of iterations is -1 if the start overflows. An end
+    whose last two Hessians needed no shift is not asked for a negative eigenvalue.
     """
     (begin, x), gradient = start, buffers.gradient
     value, norm, reach = fill_gradient(x, terms, gradient)
@@ -241,7 +246,7 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
 
 
 def iterate_by(method, memory, start, terms, shift):
-    """Return positions, gradient and what an `Iteration` returns."""
+    """Return the end of a single iteration with its gradient, and what `advance` returns."""
     model = model_in(memory)
     buffers = buffers_for(model, len(start[0]))
     end, found, shift = method.advance(model, buffers, start, terms, shift)

@@ -1,8 +1,8 @@
 """The known minimisers of a step, against the nearest of which an answer is measured.
 
-Where springs are compressed g may have several minimisers, all of them ends of the step. Two are
-known of an answer x: the limit of Newton's method from y, and its limit from x. The second counts
-only if it is proven to be a minimiser, so an answer far from all minimisers stays far.
+Where springs are compressed g may have several minimisers, each of which is an end of the step. An
+answer x is measured against two: the limit of Newton's method from y, and its limit from x. The
+second limit counts only if it is proven to be a minimiser: an answer far from all stays far.
 """
 
 import copy
@@ -17,9 +17,9 @@ from ..implicit_euler import STEP_SOLVERS, ImplicitEuler
 from ..implicit_euler.certificate import Certificate, certify
 from ..mass_spring import MassSpring, State
 
-# The smallest: only rounding stops Newton's method.
+# The smallest tolerance: only rounding stops Newton's method.
 TOLERANCE = SMALLEST_POSITIVE
-# Five times Newton's default: a step that needs more has no limit.
+# Five times Newton's default: without an end by then Newton's method has no limit.
 MAX_ITERATIONS = 500
 
 
@@ -42,7 +42,7 @@ class Minima:
     Attributes:
         objective: g of the step.
         solution: the result of Newton's method from y.
-        newton: its limit, which is a minimum if it is solved.
+        newton: the end of Newton's method from y, a minimum if the solution is solved.
         known: the minima known so far.
     """
 
@@ -64,7 +64,7 @@ class Minima:
     def nearest(self, x: FloatArray) -> Minimum:
         """Return the nearer to x of Newton's limits from y and, if proven, from x.
 
-        Other answers asked about before do not change the result.
+        Earlier calls for other answers do not change the result.
         """
         limit = self._limit(x) or self.newton
         newton = self.newton if self.solution.outcome.solved else limit
@@ -72,7 +72,7 @@ class Minima:
 
     @property
     def lowest(self) -> Minimum:
-        """The minimum with the least g of those known."""
+        """The known minimum with the least g."""
         return min(self.known or [self.newton], key=lambda minimum: minimum.value)
 
     def excess(self, x: FloatArray, base: Minimum) -> float:
