@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arguments import FloatArray, choice, frozen, instance, integer, number
+from ..arguments import FloatArray, choice, count, frozen, instance, number
 from ..backend.compiled import Kernel
 from ..mass_spring import (
     MassSpring,
@@ -98,7 +98,7 @@ class ImplicitEuler:
         solver: a name in `STEP_SOLVERS`: "newton", "newton_cg", "gauss_newton", "local_global",
             "chebyshev" or "lbfgs".
         tolerance: residual to stop at; 0 runs all iterations.
-        max_iterations: most iterations in a step; None means the solver's default.
+        max_iterations: most iterations in a step, at most 1e8; None means the solver's default.
         start: first iterate, "y", "x_n", or "explicit", the positions after h by stable steps of
             symplectic Euler, or y if more than 1,000 steps were needed. An explicit start saves
             iterations on stiff systems. None means y for all solvers but gauss_newton, which starts
@@ -126,7 +126,7 @@ class ImplicitEuler:
         object.__setattr__(self, "tolerance", number("tolerance", self.tolerance, minimum=0))
         method = STEP_SOLVERS[choice("solver", self.solver, STEP_SOLVERS)]
         limit = method.default_iterations if self.max_iterations is None else self.max_iterations
-        object.__setattr__(self, "_iteration_limit", integer("max_iterations", limit, minimum=0))
+        object.__setattr__(self, "_iteration_limit", count("max_iterations", limit, minimum=0))
         starts = ("x_n",) if self.solver == "gauss_newton" else STARTS
         start = starts[0] if self.start is None else choice("start", self.start, starts)
         object.__setattr__(self, "start", start)
@@ -234,13 +234,11 @@ class ImplicitEuler:
                 break
             residuals.append(objective.residual(iterate))
             objectives.append(iterate.value)
-            is_stuck, last, count = iterate is last, iterate, len(residuals) - 1
+            is_stuck, last, iteration = iterate is last, iterate, len(residuals) - 1
             if residuals[-1] < residuals[best]:
-                best = count
-            outcome, _ = outcome_at(
-                *(count, stop, residuals[-1], best, is_stuck),
-                *(iterate.at_floor, iterate.at_rest),
-            )
+                best = iteration
+            standing = residuals[-1], best, is_stuck, iterate.at_floor, iterate.at_rest
+            outcome, _ = outcome_at(iteration, stop, *standing)
             if outcome != GO_ON:
                 break
         x = objective.x_n if last is None else last.positions

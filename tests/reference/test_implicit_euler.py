@@ -401,6 +401,7 @@ class TestInputs:
             ("solver", "simplex", f"one of {', '.join(STEP_SOLVERS)}, got 'simplex'"),
             ("tolerance", -1e-3, "at least 0"),
             ("max_iterations", -1, "at least 0"),
+            ("max_iterations", 10**12, "at most 100,000,000"),  # the memory of a step's history
             ("start", "z", "one of y, x_n, explicit, got 'z'"),
             ("start", 1, "one of y, x_n, explicit, got 1"),
         ],
