@@ -288,7 +288,7 @@ def rounding_errors(objective: Objective, x: FloatArray) -> RoundingErrors:
     most_springs = int(np.bincount(springs.ravel(), minlength=1).max())
     return RoundingErrors(
         (GRADIENT_ROUNDING + most_springs) * EPS * float(np.linalg.norm(gradient[free])),
-        _hessian_rounding(x, rest_lengths, objective.terms, free, most_springs),
+        _hessian_rounding(x, rest_lengths, objective.terms, free, most_springs, np.empty(len(m))),
     )
 
 

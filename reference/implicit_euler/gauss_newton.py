@@ -20,13 +20,12 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring
-from ..quaternion import add, load_vector, store_vector
-from ..sparse.multifrontal import eliminate_fronts
+from ..sparse.multifrontal import factorize
 from .conjugate_gradients import iteration_limit, linearised_step
 from .factor_cache import hessian_factor
 from .objective import Iterate, Objective
 from .stopping import GO_ON
-from .terms import fill_gradient
+from .terms import fill_gradient, move_along
 from .whole_step import (
     Iteration,
     fill_descent,
@@ -79,15 +78,15 @@ class GaussNewton:
         """
         x, y, free = objective.x_n, objective.y, objective.system.free[:, None]
         gradient = objective.iterate_at(x).gradient
-        gradient = gradient + objective.pin_gradient_at(x, geometric=False)
+        gradient = gradient + objective.pin_gradient_at(x)
         iterate = objective.start
         while True:
             yield iterate
             start = x, gradient, iterate.value
-            end, found, number = _iteration(self._memory, start, objective.terms, 0.0)
+            end, accepted, number = _iteration(self._memory, start, objective.terms, 0.0)
             if number == math.inf:
-                end, found, _ = _iteration(self._factored, start, objective.terms, 0.0)
-            if found:
+                end, accepted, _ = _iteration(self._factored, start, objective.terms, 0.0)
+            if accepted:
                 iterate = objective.iterate_at(np.where(free, end[0], y))
                 x, gradient = iterate.positions, iterate.gradient
 
@@ -104,11 +103,10 @@ def gauss_newton_iteration(model, buffers, start, terms, shift):
             return (value, 0.0, 0.0), False, math.inf
     else:
         fill_hessian(model, buffers, x, terms, False)
-        if eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
+        if factorize(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0:
             return (value, 0.0, 0.0), False, shift
         fill_descent(model.factor, buffers, gradient)
-    for i in range(len(x)):
-        store_vector(buffers.end, i, add(load_vector(x, i), load_vector(buffers.step, i)))
+    move_along(x, 1.0, buffers.step, buffers.end)
     return fill_gradient(buffers.end, terms, buffers.end_gradient), True, shift
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from .objective import Iterate, Objective
-from .terms import fill_gradient, rounding_sums
+from .terms import fill_gradient, move_along, rounding_bounds
 
 # Least decrease relative to the slope's prediction, the usual choice (Nocedal & Wright 2006, 3.1).
 ARMIJO = 1e-4
@@ -21,42 +21,34 @@ HALVINGS = 40
 def line_search(objective: Objective, start: Iterate, step: FloatArray) -> Iterate:
     """Return an acceptable iterate along a descent step, or the start if there is none."""
     at = start.positions, start.gradient, start.value
-    end, found = _search(at, step, objective.terms)
-    return objective.iterate_of(*end) if found else start
+    end, end_gradient, workspace = *np.empty((2, *step.shape)), np.empty((2, len(step)))
+    numbers, accepted = _search(at, step, objective.terms, end, end_gradient, workspace)
+    return objective.iterate_of(end, end_gradient, *numbers) if accepted else start
 
 
-def search_line(start, step, terms):
-    """Return positions along a descent step, gradient, g, norm and reach, and whether acceptable.
+def search_line(start, step, terms, end, end_gradient, workspace):
+    """Fill in an end along a descent step and its gradient, (particle, 3).
 
-    `start` is of positions, gradient and g.
-    """
-    end, end_gradient = np.empty(step.shape), np.empty(step.shape)
-    room = np.empty(len(step)), np.empty(len(step))
-    numbers, found = fill_end(start, step, terms, end, end_gradient, room)
-    return (end, end_gradient, *numbers), found
+    `start` is of positions, gradient and g. The workspace is that of `rounding_bounds`.
 
-
-def fill_end(start, step, terms, end, end_gradient, room):
-    """Fill in positions and gradient, and return the rest of `search_line`.
-
-    They are acceptable if g decreased enough or, within rounding, if the slope there is small.
+    Returns:
+        g, |grad g| and the largest |x_i| of the end; whether the end is accepted, since g decreased
+        enough or, within rounding, the slope there is small.
     """
     x, gradient, value = start
     slope, length = inner_product(gradient, step), 1.0
-    end_value, norm, reach, found = value, 0.0, 0.0, False
+    end_value, norm, reach, accepted = value, 0.0, 0.0, False
     for _ in range(HALVINGS):
-        for i in range(len(x)):
-            for c in range(3):
-                end[i, c] = x[i, c] + length * step[i, c]
+        move_along(x, length, step, end)
         end_value, norm, reach = fill_gradient(end, terms, end_gradient)
         rise = end_value - value
-        found = rise <= ARMIJO * length * slope
-        if not found and inner_product(end_gradient, step) <= (2.0 * ARMIJO - 1.0) * slope:
-            found = rise <= rounding_sums(end, terms, *room)[1]
-        if found:
+        accepted = rise <= ARMIJO * length * slope
+        if not accepted and inner_product(end_gradient, step) <= (2.0 * ARMIJO - 1.0) * slope:
+            accepted = rise <= rounding_bounds(end, terms, workspace)[1]
+        if accepted:
             break
         length /= 2.0
-    return (end_value, norm, reach), found
+    return (end_value, norm, reach), accepted
 
 
 def inner_product(a, b):

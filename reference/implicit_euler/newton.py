@@ -13,11 +13,11 @@ from typing import Any
 from ..arguments import FloatArray
 from ..backend.compiled import Kernel
 from ..mass_spring import MassSpring
-from ..sparse.multifrontal import eliminate_fronts
+from ..sparse.multifrontal import factorize
 from .factor_cache import hessian_factor
-from .line_search import fill_end
+from .line_search import search_line
 from .objective import Iterate, Objective
-from .terms import hessian_error
+from .terms import hessian_rounding
 from .whole_step import (
     Iteration,
     fill_descent,
@@ -55,8 +55,8 @@ class Newton:
         while True:
             yield iterate
             start = iterate.positions, iterate.gradient, iterate.value
-            end, found, shift = _iteration(self._memory, start, objective.terms, shift)
-            iterate = objective.iterate_of(*end) if found else iterate
+            end, accepted, shift = _iteration(self._memory, start, objective.terms, shift)
+            iterate = objective.iterate_of(*end) if accepted else iterate
 
 
 def newton_iteration(model, buffers, start, terms, shift):
@@ -74,27 +74,25 @@ def newton_iteration(model, buffers, start, terms, shift):
         if shift == math.inf:
             return (start[2], 0.0, 0.0), False, FIRST_SHIFT
     fill_descent(model.factor, buffers, start[1])
-    end, found = fill_end(
-        start, buffers.step, terms, buffers.end, buffers.end_gradient, buffers.room
-    )
-    return end, found, shift
+    end = buffers.end, buffers.end_gradient, buffers.workspace
+    return *search_line(start, buffers.step, terms, *end), shift
 
 
 def is_factorised(model, buffers, shift):
     """Factorise the Hessian plus `shift` times M; return whether the sum is positive definite."""
     for i in range(len(model.diagonal)):
         buffers.data[model.diagonal[i]] = buffers.unshifted[i] + shift * model.masses[i]
-    return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) < 0
+    return factorize(model.factor, buffers.data, buffers.values, buffers.scratch) < 0
 
 
 def is_saddle(model, buffers, x, terms):
     """Return whether the Hessian at x has a negative eigenvalue, beyond rounding."""
-    rest_lengths, room = model.system.rest_lengths, buffers.room[0]
-    error = hessian_error(x, rest_lengths, terms, model.free, model.most_springs, room)
+    rest_lengths, sizes = model.system.rest_lengths, buffers.workspace[0]
+    error = hessian_rounding(x, rest_lengths, terms, model.free, model.most_springs, sizes)
     fill_hessian(model, buffers, x, terms, True)
     for i in model.diagonal:
         buffers.data[i] += error
-    return eliminate_fronts(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0
+    return factorize(model.factor, buffers.data, buffers.values, buffers.scratch) >= 0
 
 
 NEWTON = Iteration(newton_iteration, is_saddle)

@@ -31,8 +31,8 @@ from .terms import (
     EPS,
     SUM_ROUNDING,
     blend_dampers,
-    evaluate_objective,
     evaluate_regions,
+    fill_gradient,
     is_finite,
     join_regions,
     rounding_bounds,
@@ -174,21 +174,23 @@ class Objective:
 
     def iterate_at(self, positions: FloatArray) -> Iterate:
         """Return g and its gradient at positions neither checked nor copied."""
-        regions = self.system.with_separate_dampers.regions
+        regions, gradient = self.system.with_separate_dampers.regions, np.empty(positions.shape)
         if regions is None:
-            return self.iterate_of(positions, *_evaluate(positions, *self.terms))
-        return self.iterate_of(positions, *_evaluate_in_parallel(positions, self.terms, regions))
+            numbers = _fill_gradient(positions, self.terms, gradient)
+        else:
+            numbers = _fill_in_parallel(positions, self.terms, regions, gradient)
+        return self.iterate_of(positions, gradient, *numbers)
 
     def iterate_of(
         self, x: FloatArray, gradient: FloatArray, value: float, norm: float, reach: float
     ) -> Iterate:
-        """Return the iterate of positions and what `evaluate_objective` returns for them."""
+        """Return the iterate of positions with their gradient and the result of `fill_gradient`."""
         a, b = self._floor_coefficients
         return Iterate(x, gradient, value, norm, a + b * reach, self._rounding)
 
     def _rounding(self, positions: FloatArray) -> tuple[float, float]:
         """Return bounds on the rounding errors of the gradient's norm and of g."""
-        return _rounding_bounds(positions, *self.terms)
+        return _rounding_bounds(positions, self.terms, np.empty((2, len(positions))))
 
     def residual(self, iterate: Iterate) -> float:
         """Return |grad g(x)| / max(|grad g(y)|, floor), infinite if g overflows at x or at y."""
@@ -229,17 +231,17 @@ class Objective:
         hessian.data[springs.diagonal] += np.repeat(self.system.free_masses, 3)
         return hessian
 
-    def pin_gradient_at(self, x: FloatArray, *, geometric: bool) -> FloatArray:
+    def pin_gradient_at(self, x: FloatArray) -> FloatArray:
         """Return h² K times the displacement of the pins from x_n to y, shape (particle, 3) [kg m].
 
         It is the contribution of the pins to the gradient at the free particles, zero at the pins,
-        with springs linearised at x, which is not checked. K is as for `hessian`.
+        with springs linearised at x, which is not checked. K has no geometric terms.
         """
         displacement = np.where(self.system.free[:, None], 0.0, self.y - self.x_n)
         if not displacement.any():
             return displacement
         i, j = self.effective.springs.T
-        K = self.h * self.h * mass_spring.blocks(x, self.effective.arrays, geometric)
+        K = self.h * self.h * mass_spring.blocks(x, self.effective.arrays, False)
         pulls = np.einsum("sab,sb->sa", K, displacement[i] - displacement[j])
         return self.system.with_separate_dampers.free_incidence @ pulls
 
@@ -289,20 +291,21 @@ def _effective(
     return separate.replaced(**springs, dampings=np.zeros(len(stiffnesses))), constant
 
 
-def _evaluate_in_parallel(
-    x: FloatArray, step: tuple[Any, ...], regions: Regions
-) -> tuple[FloatArray, float, float, float]:
-    """Return the same as `evaluate_objective`, with the regions shared among threads."""
-    h, constant, particles, _, elastic, pinned = step
-    gradient, sums = np.empty(x.shape), np.empty((len(regions.particles) - 1, 2))
-    terms = x, h, particles, elastic, regions
+def _fill_in_parallel(
+    x: FloatArray, terms: tuple[Any, ...], regions: Regions, gradient: FloatArray
+) -> tuple[float, float, float]:
+    """Do the same as `fill_gradient`, with the regions shared among threads."""
+    h, constant, particles, _, elastic, pinned = terms
+    sums, step = np.empty((len(regions.particles) - 1, 2)), (x, h, particles, elastic, regions)
     in_slices(
-        _regions, len(sums), lambda part: (*terms, part.start, part.stop, gradient, sums), minimum=1
+        _regions, len(sums), lambda part: (*step, part.start, part.stop, gradient, sums), minimum=1
     )
-    return gradient, *_join(x, h, constant, elastic, pinned, regions, gradient, sums)
+    numbers: tuple[float, float, float]
+    numbers = _join(x, h, constant, elastic, pinned, regions, gradient, sums)
+    return numbers
 
 
-_evaluate = Kernel(evaluate_objective, label="the objective of implicit Euler")
+_fill_gradient = Kernel(fill_gradient, label="the objective of implicit Euler")
 _regions = Kernel(evaluate_regions)
 _join = Kernel(join_regions)
 _rounding_bounds = Kernel(rounding_bounds)

@@ -15,7 +15,7 @@ import math
 import numpy as np
 from numpy import uint64 as at
 
-from ..arguments import LARGEST_COORDINATE
+from ..explicit import are_bounded
 from ..mass_spring import spring_frame, spring_line, spring_stretch
 from ..quaternion import add, dot, load_vector, norm, scale, store_vector, subtract
 
@@ -35,13 +35,17 @@ MARGIN = 1.000001
 def inertial_positions(x_n, v_n, h, pinned, targets):
     """Return y = x_n + h v_n, with the pins at their targets, or at x_n if there are none."""
     y = np.empty(x_n.shape)
-    for i in range(len(y)):
-        for c in range(3):
-            y[i, c] = x_n[i, c] + h * v_n[i, c]
+    move_along(x_n, h, v_n, y)
     for p in range(len(pinned)):
-        for c in range(3):
-            y[pinned[p], c] = targets[p, c] if len(targets) > 0 else x_n[pinned[p], c]
+        i = pinned[p]
+        store_vector(y, i, load_vector(targets, p) if len(targets) > 0 else load_vector(x_n, i))
     return y
+
+
+def move_along(x, length, direction, end):
+    """Fill in x + length direction, all of shape (particle, 3)."""
+    for i in range(len(x)):
+        store_vector(end, i, add(load_vector(x, i), scale(length, load_vector(direction, i))))
 
 
 def move_free(x, begin, free):
@@ -56,13 +60,11 @@ def step_end(x_n, x, h, history):
 
     The history is empty where a number exceeds LARGEST_COORDINATE.
     """
-    end, bounded = np.empty((2, len(x), 3)), True
+    end = np.empty((2, len(x), 3))
     for i in range(len(x)):
         for c in range(3):
-            place, rate = x[i, c], (x[i, c] - x_n[i, c]) / h
-            end[0, i, c], end[1, i, c] = place, rate
-            bounded &= abs(place) <= LARGEST_COORDINATE and abs(rate) <= LARGEST_COORDINATE
-    return end, (history if bounded else np.empty((2, 0)))
+            end[0, i, c], end[1, i, c] = x[i, c], (x[i, c] - x_n[i, c]) / h
+    return end, (history if are_bounded(end[0], end[1]) else np.empty((2, 0)))
 
 
 def is_finite(value, gradient_norm, floor_bound):
@@ -71,15 +73,15 @@ def is_finite(value, gradient_norm, floor_bound):
     return math.isfinite(value + gradient_norm + terms * terms)
 
 
-def standing(x, norm, bound, terms, first, room):
+def standing(x, norm, bound, terms, first, workspace):
     """Return the residual at x, whether the gradient is at the floor, and whether at rest.
 
-    `norm` is the gradient's, `bound` that of the floor, `first` the norm at y; `room` is that of
-    `rounding_sums`.
+    `norm` is |grad g(x)|, `first` is |grad g(y)|, and `bound` is above the floor. The workspace is
+    that of `rounding_bounds`.
     """
     at_floor, at_rest, scale = False, False, first
     if norm <= bound or first < bound:
-        floor, _ = rounding_sums(x, terms, *room)
+        floor, _ = rounding_bounds(x, terms, workspace)
         at_floor, at_rest = norm <= floor, norm <= EPS / SUM_ROUNDING * floor
         scale = max(first, floor)
     return 0.0 if norm == 0.0 else norm / scale, at_floor, at_rest
@@ -103,15 +105,8 @@ def blend_dampers(x_n, h, stiffnesses, system):
     return rest_lengths, constant
 
 
-def evaluate_objective(x, h, constant, particles, springs, elastic, pinned):
-    """Return grad g, g, |grad g| and the largest distance of a particle from the origin."""
-    gradient = np.empty(x.shape)
-    terms = h, constant, particles, springs, elastic, pinned
-    return gradient, *fill_gradient(x, terms, gradient)
-
-
 def fill_gradient(x, terms, gradient):
-    """Fill an array with grad g, and return the rest of `evaluate_objective`."""
+    """Fill in grad g, (particle, 3); return g, |grad g| and the largest |x_i|."""
     h, constant, particles, springs, (rest_lengths, stiffnesses, tension_only), pinned = terms
     hh = h * h
     value, largest = add_particles(x, particles, hh, 0, len(x), gradient)
@@ -197,15 +192,13 @@ def zero_pins(pinned, gradient):
     return math.sqrt(squares)
 
 
-def rounding_bounds(x, h, constant, particles, springs, elastic, pinned):
-    """Return upper bounds of the rounding errors of |grad g| and of g."""
-    terms = h, constant, particles, springs, elastic, pinned
-    return rounding_sums(x, terms, np.empty(len(x)), np.empty(len(x)))
+def rounding_bounds(x, terms, workspace):
+    """Return upper bounds of the rounding errors of |grad g| and of g.
 
-
-def rounding_sums(x, terms, size, reach):
-    """Do the same as `rounding_bounds` with room for two numbers of each particle."""
+    The workspace has shape (2, particle).
+    """
     h, _, (y, external, masses), springs, elastic, pinned = terms
+    size, reach = workspace[0], workspace[1]
     rest_lengths, stiffnesses, tension_only = elastic
     value_size, squares = 0.0, 0.0
     for i in range(len(x)):
@@ -233,16 +226,12 @@ def rounding_sums(x, terms, size, reach):
     return SUM_ROUNDING * math.sqrt(squares), SUM_ROUNDING * value_size
 
 
-def hessian_rounding(x, rest_lengths, terms, free, most_springs):
+def hessian_rounding(x, rest_lengths, terms, free, most_springs, sizes):
     """Return an upper bound of the rounding error of the Hessian at x, in norm [kg].
 
     The error includes that of the effective rest lengths, relative to these and the given ones.
+    `sizes` is workspace, (particle,).
     """
-    return hessian_error(x, rest_lengths, terms, free, most_springs, np.empty(len(x)))
-
-
-def hessian_error(x, rest_lengths, terms, free, most_springs, sizes):
-    """Do the same as `hessian_rounding` with room for a number of each particle."""
     h, _, (_, _, masses), springs, (effective, stiffnesses, tension_only), _ = terms
     largest = 0.0
     for i in range(len(sizes)):

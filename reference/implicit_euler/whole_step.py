@@ -177,7 +177,7 @@ class Buffers(NamedTuple):
     step: np.ndarray  # from the iterate to the end, (particle, 3)
     end: np.ndarray  # positions after the iteration, (particle, 3)
     end_gradient: np.ndarray  # (particle, 3)
-    room: tuple[np.ndarray, np.ndarray]  # see `rounding_sums`
+    workspace: np.ndarray  # of `rounding_bounds`, (2, particle)
     products: ProductRoom
 
 
@@ -198,7 +198,7 @@ def buffers_for(model, n):
         np.empty((n, 3)),
         np.empty((n, 3)),
         np.empty((n, 3)),
-        (np.empty(n), np.empty(n)),
+        np.empty((2, n)),
         product_room(0 if factored else n, 0 if factored else len(model.places)),
     )
 
@@ -213,7 +213,7 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
     (begin, x), gradient = start, buffers.gradient
     value, norm, reach = fill_gradient(x, terms, gradient)
     first, count, best, at_floor, outcome = norm, -1, 0, False, GO_ON
-    shift, found, convex = 0.0, True, False
+    shift, accepted, convex = 0.0, True, False
     if len(begin) > 0 and is_finite(value, norm, floor[0] + floor[1] * reach):
         move_free(x, begin, model.free)
         value, norm, reach = fill_gradient(x, terms, gradient)
@@ -221,26 +221,26 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
         bound = floor[0] + floor[1] * reach
         if not is_finite(value, norm, bound):
             return count, at_floor, DIVERGED
-        if count >= 0 and found:
+        if count >= 0 and accepted:
             overwrite(x, buffers.end)
             overwrite(gradient, buffers.end_gradient)
         count += 1
-        residual, at_floor, at_rest = standing(x, norm, bound, terms, first, buffers.room)
+        residual, at_floor, at_rest = standing(x, norm, bound, terms, first, buffers.workspace)
         history[0, count], history[1, count] = residual, value
         if residual < history[0, best]:
             best = count
-        outcome, at_end = outcome_at(count, stop, residual, best, not found, at_floor, at_rest)
+        outcome, at_end = outcome_at(count, stop, residual, best, not accepted, at_floor, at_rest)
         solved = outcome in (CONVERGED, AT_ROUNDING)
         if solved and not convex and method.refuses(model, buffers, x, terms):
             outcome = SADDLE if at_end else GO_ON
         if outcome == GO_ON:
             before = shift if count > 0 else math.inf
             start = x, gradient, value
-            end, found, shift = method.advance(model, buffers, start, terms, shift)
+            end, accepted, shift = method.advance(model, buffers, start, terms, shift)
             convex = shift == 0.0 and before == 0.0
             if shift == math.inf:
                 return count, at_floor, GO_ON
-            if found:
+            if accepted:
                 value, norm, reach = end
     return count, at_floor, outcome
 
@@ -249,8 +249,8 @@ def iterate_by(method, memory, start, terms, shift):
     """Return the end of a single iteration with its gradient, and what `advance` returns."""
     model = model_in(memory)
     buffers = buffers_for(model, len(start[0]))
-    end, found, shift = method.advance(model, buffers, start, terms, shift)
-    return (buffers.end, buffers.end_gradient, *end), found, shift
+    end, accepted, shift = method.advance(model, buffers, start, terms, shift)
+    return (buffers.end, buffers.end_gradient, *end), accepted, shift
 
 
 def fill_hessian(model, buffers, x, terms, geometric):

@@ -38,7 +38,7 @@ class BlockSum:
 
     @property
     def places(self) -> tuple[IndexArray, IndexArray, IndexArray]:
-        """The arguments of `sum_blocks` after the blocks."""
+        """The arguments of `add_blocks` between blocks and data."""
         return self._places, self._ends, self._starts
 
     @property
@@ -48,7 +48,8 @@ class BlockSum:
 
     def matrix(self, blocks: FloatArray) -> Any:
         """Return the sum for blocks (spring, 3, 3), sparse CSC (3 particle, 3 particle)."""
-        data = _summed_blocks(blocks, self._places, self._ends, self._starts)
+        data = np.zeros(9 * len(self._rows))
+        _add_blocks(blocks, *self.places, data)
         return _filled(self._wide[0], data)
 
     def scalar_matrix(self, weights: FloatArray, diagonal: FloatArray) -> Any:
@@ -109,13 +110,6 @@ def find(rows, first, last, row):
     return first
 
 
-def sum_blocks(blocks, places, ends, starts):
-    """Return the data of the sum of (A_i A_i') x B_i in the widened pattern."""
-    data = np.zeros(9 * starts[-1])
-    add_blocks(blocks, places, ends, starts, data)
-    return data
-
-
 def add_blocks(blocks, places, ends, starts, data):
     """Add the sum of (A_i A_i') x B_i to data in the widened pattern."""
     for s in range(len(places)):
@@ -142,5 +136,5 @@ def sum_weights(weights, diagonal, places, starts, rows):
 
 
 _block_places = Kernel(block_places)
-_summed_blocks = Kernel(sum_blocks)
+_add_blocks = Kernel(add_blocks)
 _summed_weights = Kernel(sum_weights)

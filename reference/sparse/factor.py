@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..arguments import FloatArray, floats, shape, shown
 from ..backend.compiled import Kernel
 from .dissection import Graph
-from .multifrontal import SMALLEST, factorize, round_entries
+from .multifrontal import SMALLEST, factorize, round_entries, scratch_for
 from .symbolic import SymbolicFactor, analyse
 from .triangular import REGISTER, RIGHT_HAND_SIDES, solve
 
@@ -42,7 +42,9 @@ class CholeskyFactor:
             pattern = analyse(graph)
         self.pattern = pattern
         self._values = np.empty(pattern.updates.entries)
-        failed = _factorize(pattern, np.array(columns.data, dtype=np.float64), self._values)
+        scratch = scratch_for(pattern.blocks, pattern.updates, len(pattern.order))
+        data = np.array(columns.data, dtype=np.float64)
+        failed = _factorize(pattern, data, self._values, scratch)
         if failed >= 0:
             raise NotPositiveDefiniteError(
                 f"matrix: expected positive definite, got no positive pivot in row"

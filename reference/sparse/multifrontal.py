@@ -42,16 +42,10 @@ def scratch_for(blocks, updates, n):
     )
 
 
-def factorize(pattern, data, values):
-    """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
-    scratch = scratch_for(pattern.blocks, pattern.updates, len(pattern.order))
-    return eliminate_fronts(pattern, data, values, scratch)
-
-
 @relaxed
 @uncounted
-def eliminate_fronts(pattern, data, values, scratch):
-    """Do the same as `factorize` with scratch made before."""
+def factorize(pattern, data, values, scratch):
+    """Fill `values` with L's columns; return the first without a positive pivot, or -1."""
     graph, order, place, blocks, updates = pattern
     work, stack, local, places = scratch
     columns, starts, rows = blocks.columns, blocks.starts, blocks.rows

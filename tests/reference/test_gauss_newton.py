@@ -187,13 +187,13 @@ def test_the_factor_is_made_only_without_convergence(monkeypatch):
     """Counted in the interpreter."""
     system, state = cloth()
     integrator, (_, direct) = ImplicitEuler(system, h=h, solver="gauss_newton"), integrators(system)
-    counts, eliminate = [0], gauss_newton.eliminate_fronts
+    counts, eliminate = [0], gauss_newton.factorize
 
     def counted(*arguments):
         counts[-1] += 1
         return eliminate(*arguments)
 
-    monkeypatch.setattr(gauss_newton, "eliminate_fronts", counted)
+    monkeypatch.setattr(gauss_newton, "factorize", counted)
     with set_backend("python"):
         expected = direct.step(state).state.positions
         counts.append(0)

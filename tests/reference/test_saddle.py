@@ -136,13 +136,13 @@ def test_what_newton_calls_an_end_agrees_with_the_eigenvalues(seed):
 
 def test_ordinary_steps_factorise_once_an_iteration(monkeypatch):
     """The end of a swinging cloth's step is accepted without a further factor."""
-    count, eliminate = [0], newton.eliminate_fronts
+    count, eliminate = [0], newton.factorize
 
     def counted(*arguments):
         count[0] += 1
         return eliminate(*arguments)
 
-    monkeypatch.setattr(newton, "eliminate_fronts", counted)
+    monkeypatch.setattr(newton, "factorize", counted)
     system, state = scenes.lab_cloth(size=4, stiffness=1e4, damping=0.2, gravity=9.81)
     integrator = ImplicitEuler(system, h=1 / 60)
     for _ in range(5):
