@@ -60,7 +60,7 @@ def iteration_bound(system: MassSpring, h: float) -> float:
     return 0.5 * root * math.log(2.0 * root / TOLERANCE)
 
 
-class ProductRoom(NamedTuple):
+class CGWorkspace(NamedTuple):
     """Workspace of conjugate gradients; the fourth number of each row stays zero."""
 
     rows: np.ndarray  # a and b of each spring, (2 spring, 4)
@@ -69,25 +69,25 @@ class ProductRoom(NamedTuple):
     vectors: np.ndarray  # residual, solution, direction and product, (4, particle, 4)
 
 
-def product_room(particles, springs):
-    """Return room for so many particles and springs."""
+def cg_workspace(particles, springs):
+    """Return the workspace for a number of particles and of springs."""
     blocks = np.empty((particles, 3)), np.empty((particles, 3))
-    return ProductRoom(np.empty((2 * springs, 4)), *blocks, np.zeros((4, particles, 4)))
+    return CGWorkspace(np.empty((2 * springs, 4)), *blocks, np.zeros((4, particles, 4)))
 
 
 @relaxed
 @uncounted
-def linearised_step(start, terms, roots, limit, room, step):
+def linearised_step(start, terms, roots, limit, workspace, step):
     """Fill in the step to the minimum of g with the springs linearised at the start.
 
     `start` is of positions and the gradient, zero at the pins; `roots` are (h² k)^1/2 of the
     springs. Return whether at most `limit` iterations bring the residual within the tolerance.
     """
-    (x, gradient), (rows, diagonals, lower, vectors) = start, room
+    (x, gradient), (rows, diagonals, lower, vectors) = start, workspace
     _, _, (_, _, masses), springs, (rest_lengths, _, tension_only), pinned = terms
     elastic = rest_lengths, roots, tension_only
     residual, solution = vectors[0], vectors[1]
-    add_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower)
+    fill_springs_and_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower)
     for i in range(len(x)):
         factorize_block(diagonals, lower, i)
         store_vector(residual, i, eliminate(diagonals, lower, i, load_vector(gradient, i)))
@@ -103,10 +103,11 @@ def linearised_step(start, terms, roots, limit, room, step):
     return converged
 
 
-def add_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower):
-    """Store (h² k)^1/2 u of each spring, zero if slack, in two rows; sum the diagonal blocks.
+def fill_springs_and_blocks(x, masses, springs, elastic, pinned, rows, diagonals, lower):
+    """Fill in (h² k)^1/2 u of each spring, zero if slack, in two rows, and the diagonal blocks.
 
-    A block has a diagonal xx, yy, zz, infinite at the pins, and yx, zx, zy below.
+    A block has a diagonal xx, yy, zz, infinite at the pins, and yx, zx, zy below. The
+    second array of `elastic` holds (h² k)^1/2.
     """
     rest_lengths, roots, tension_only = elastic
     for i in range(len(x)):

@@ -98,8 +98,8 @@ def gauss_newton_iteration(model, buffers, start, terms, shift):
     """
     x, gradient, value = start
     if model.product_limit > 0:
-        limit, room, step = model.product_limit, buffers.products, buffers.step
-        if not linearised_step((x, gradient), terms, model.roots, limit, room, step):
+        limit, workspace, step = model.product_limit, buffers.products, buffers.step
+        if not linearised_step((x, gradient), terms, model.roots, limit, workspace, step):
             return (value, 0.0, 0.0), False, math.inf
     else:
         fill_hessian(model, buffers, x, terms, False)

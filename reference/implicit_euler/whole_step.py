@@ -17,7 +17,7 @@ from ..sparse.dissection import Graph
 from ..sparse.multifrontal import Scratch, scratch_for
 from ..sparse.symbolic import Supernodes, SymbolicFactor, UpdateTree
 from ..sparse.triangular import REGISTER, RIGHT_HAND_SIDES, solve
-from .conjugate_gradients import ProductRoom, product_room
+from .conjugate_gradients import CGWorkspace, cg_workspace
 from .objective import effective_stiffnesses
 from .stopping import AT_ROUNDING, CONVERGED, DIVERGED, GO_ON, SADDLE, outcome_at
 from .terms import (
@@ -178,7 +178,7 @@ class Buffers(NamedTuple):
     end: np.ndarray  # positions after the iteration, (particle, 3)
     end_gradient: np.ndarray  # (particle, 3)
     workspace: np.ndarray  # of `rounding_bounds`, (2, particle)
-    products: ProductRoom
+    products: CGWorkspace
 
 
 def buffers_for(model, n):
@@ -199,7 +199,7 @@ def buffers_for(model, n):
         np.empty((n, 3)),
         np.empty((n, 3)),
         np.empty((2, n)),
-        product_room(0 if factored else n, 0 if factored else len(model.places)),
+        cg_workspace(0 if factored else n, 0 if factored else len(model.places)),
     )
 
 
@@ -207,8 +207,9 @@ def minimise(method, model, buffers, start, terms, floor, history, stop):
     """Iterate until `outcome_at` says so; return the number of iterations, at_floor, the outcome.
 
     `start` is of the positions to begin at, and of x, which is y and becomes the end. `floor` holds
-    the two `rounding_coefficients`. The number of iterations is -1 if the start overflows. An end
-    whose last two Hessians needed no shift is not asked for a negative eigenvalue.
+    the two `rounding_coefficients`. The number of iterations is -1 if the start overflows. The
+    outcome is GO_ON if the method gives up. An end is tested for a negative eigenvalue unless the
+    last two iterations needed no shift.
     """
     (begin, x), gradient = start, buffers.gradient
     value, norm, reach = fill_gradient(x, terms, gradient)

@@ -9,10 +9,10 @@ from plumbob.reference.backend.compiled import Kernel, set_backend
 from plumbob.reference.implicit_euler import ImplicitEuler, gauss_newton
 from plumbob.reference.implicit_euler.conjugate_gradients import (
     TOLERANCE,
+    cg_workspace,
     iteration_bound,
     iteration_limit,
     linearised_step,
-    product_room,
 )
 from plumbob.reference.implicit_euler.factor_cache import hessian_factor
 from plumbob.reference.mass_spring import MassSpring, State, lengths
@@ -27,9 +27,9 @@ _linearised_step = Kernel(linearised_step, relaxed=True)
 
 def solve_linearised(x, gradient, terms, limit):
     """Return the solution and whether it converged."""
-    room, step = product_room(len(x), len(terms[3])), np.empty(x.shape)
+    workspace, step = cg_workspace(len(x), len(terms[3])), np.empty(x.shape)
     roots = terms[0] * np.sqrt(terms[4][1])
-    converged = _linearised_step((x, gradient), terms, roots, limit, room, step)
+    converged = _linearised_step((x, gradient), terms, roots, limit, workspace, step)
     return -step, converged
 
 
