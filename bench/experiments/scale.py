@@ -62,10 +62,10 @@ CLOTH_METHODS = (EXPLICIT, *STOPS, SUPERNODAL, SCIPY)
 # Flops of a spring's pull on both ends, of an entry of L in a solve with L and L' for three
 # coordinates, and of a joint's global rotation (28) and position (33).
 SPRING_FLOPS, ENTRY_FLOPS, JOINT_FLOPS = 21, 12, 61
-# Rounds, each of which times all parts once: as many as the time allows, within limits.
+# Least and most rounds, each of which times all parts once.
 ROUNDS = (3, 9)
-# Rows of the matrices of a dense product; bytes of a plain read: more than caches hold, and enough
-# to outlast the call.
+# Rows of the matrices of a dense product. Bytes of a plain read: at most more than caches hold, at
+# least enough to take longer than the call.
 ROWS, LONGEST_READ, SHORTEST_READ = 1000, 2**28, 2**20
 # Time limit of a part [s], for example the factor of a million particles, with compilation.
 PATIENCE = 1800.0
@@ -104,8 +104,8 @@ def blocks(scale: Scale) -> Iterator[Block]:
         *product(sizes[-1:], ["newton_cg"], EXTREMES),
     ]
     for size, solver, k in cloths:
-        settings: dict[str, Any] = {"size": size * size, "stiffness": k, "h": H}
-        settings |= {"steps": STEPS} if solver == EXPLICIT else STOPS.get(solver, {})
+        stop = {"steps": STEPS} if solver == EXPLICIT else STOPS.get(solver, {})
+        settings = {"size": size * size, "stiffness": k, "h": H, **stop}
         case = PATIENCE, compiled_and_measured, size, solver, k, seconds
         if solver != SCIPY or size <= MAX_SIZE_SCIPY:
             measure: Callable[[], Measured] = partial(in_a_fresh_process, *case)
@@ -113,19 +113,18 @@ def blocks(scale: Scale) -> Iterator[Block]:
                         facts={"task": "cloth"})  # fmt: skip
     run = secrets.token_hex(8)
     for joints, solver in product(JOINTS, (*IK, KINEMATICS)):
-        measure, settings = partial(_chain, run, joints, seconds, solver), {"size": joints}
-        settings |= LIMITS
+        measure, settings = partial(_chain, run, joints, seconds, solver), {"size": joints} | LIMITS
         yield Block("scale", f"chain/{joints}", solver, measure, settings, size=seconds,
                     facts={"task": "chain"})  # fmt: skip
 
 
 def _chain(run: str, joints: int, seconds: float, solver: str) -> Measured:
-    costs: Measured = _chains(run, joints, seconds)[solver]
-    return costs
+    return _chains(run, joints, seconds)[solver]
 
 
 @lru_cache(maxsize=1)  # the blocks of a length follow one another
-def _chains(run: str, joints: int, seconds: float) -> Mapping[str, Any]:
+def _chains(run: str, joints: int, seconds: float) -> Mapping[str, Measured]:
+    """Return the costs of a chain by method; each run, by its digits, measures again."""
     return in_a_fresh_process(PATIENCE, measure_chains, joints, seconds)
 
 
@@ -257,9 +256,11 @@ def times_beside_limits(work: WorkOfCall, seconds: float, name: str) -> dict[str
     """Return the times of work in rounds [s], and of as many bytes and flops as it must do."""
     read = max(8, min(LONGEST_READ, int(work.bytes_read / work.passes)))
     numbers, repeats, dense = np.ones(read // 8), -(-SHORTEST_READ // read), np.ones((ROWS, ROWS))
-    calls: dict[str, Callable[[], Any]] = {"seconds": work.call, "computing": lambda: dense @ dense}
-    calls["reading"] = partial(_total, numbers, repeats)
-    timers = {part: processor_timer(call) for part, call in calls.items()}
+    timers = {
+        "seconds": processor_timer(work.call),
+        "computing": processor_timer(lambda: dense @ dense),
+        "reading": processor_timer(partial(_total, numbers, repeats)),
+    }
     loops = {part: shape(timer, seconds)[0] for part, timer in timers.items()}
     times: dict[str, list[float]] = {part: [] for part in timers}
     limit = time_limit(seconds)
@@ -324,7 +325,7 @@ TITLES = {
     SCIPY: "factor by SciPy's SuperLU",
 }
 LIMIT = catalogue.MACHINE.name
-# Less growth than this [bytes] may be freed memory that is used again.
+# Less growth than this [bytes] may be memory that was freed before and is used again.
 NOTICED = 2**20
 
 
@@ -361,16 +362,14 @@ def row_of(record: Record, smaller: Row | None = None) -> Row:
 
 def rows(kind: str, results: Results) -> list[Row]:
     """Return the rows of cloths of the common stiffness or of chains, by method and size."""
-    records, common = results.all("scale", task=kind), (None, STIFFNESS)
-    order = solvers(records)
-    records = [record for record in records if record.values.stiffness in common]
-    records.sort(key=lambda record: (order.index(record.solver), record.values.size))
+    records = sorted(results.all("scale", task=kind), key=lambda record: record.values.size)
     members: list[Row] = []
-    for record in records:
-        same = [
-            m for m in members if m.record.solver == record.solver and m.size < record.values.size
-        ]
-        members += [row_of(record, *same[-1:])]
+    for solver in solvers(records):
+        smaller = None
+        for record in records:
+            if record.solver == solver and record.values.stiffness in (None, STIFFNESS):
+                smaller = row_of(record, smaller)
+                members.append(smaller)
     return members
 
 
