@@ -26,7 +26,7 @@ from .mass_spring import (
     MassSpring,
     State,
     add_pulls,
-    checked_state,
+    check_particles,
     constant_forces,
     pin_targets,
 )
@@ -127,63 +127,74 @@ def _advanced(
 ) -> State:
     """Check the arguments; return the state after all steps, pins exactly at their targets."""
     h, steps = number("h", h, above=0), integer("steps", steps, minimum=1)
-    x, v = checked_state(system, state)
+    check_particles(system, state)
+    constant = system.weights
+    if external_forces is not None:
+        constant = constant_forces(system, external_forces)
+    kernel, arrays = _INTEGRATORS[integrator]
+    # NumPy's memory is in large pages, which kernels do not ask for.
+    rows = np.empty((arrays, system.particle_count, 4))
+    rows[:, :, 3] = 0.0
+    x, v = rows[:2, :, :3]
+    x[:], v[:] = state.positions, state.velocities
+    v[system.pinned] = 0.0
     if pin_positions is not None:
         targets = pin_targets(system, pin_positions)
         with np.errstate(over="ignore"):
             v[system.pinned] = (targets - x[system.pinned]) / (steps * h)
-    constant = constant_forces(system, external_forces)
     at_once = 1 if steps == 1 else 1 + WORK // (len(x) + len(system.springs))
     while steps > 0:
         count = steps if steps < at_once else at_once
         steps -= count
-        if not _INTEGRATORS[integrator](x, v, h, count, constant, system.arrays):
+        if not kernel(rows, h, count, constant, system.arrays):
             left = f"the steps left the numbers up to {LARGEST_COORDINATE:g}; h is too large"
             raise FloatingPointError(f"{integrator}: {left}")
     if pin_positions is not None:
         x[system.pinned] = targets
-    return State.of(x, v)
+    return State.of(x.copy(), v.copy())
 
 
-def symplectic_euler_steps(x, v, h, steps, constant, system):
-    """Make steps of symplectic Euler in place, pins at their velocities; return `are_bounded`.
+def symplectic_euler_steps(rows, h, steps, constant, system):
+    """Make steps of symplectic Euler, pins at their velocities; return `are_bounded`.
 
-    Rows of four numbers have capital names; the fourth number is zero and fills a register.
+    `rows` are positions, velocities and forces, (3, particle, 4). The fourth number of a row is
+    zero and fills a register.
     """
-    X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
-    springs = springs_in_lanes(system)
+    x, v, total = rows[0], rows[1], rows[2]
+    mobility, springs = mobilities(system), springs_in_lanes(system)
     for _ in range(steps):
         overwrite(total, constant)
-        add_pulls_in_lanes(X, V, system, springs, total)
+        add_pulls_in_lanes(x, v, system, springs, total)
         for i in range(len(x)):
-            v_i = add(load_vector(V, i), scale(h * mobility[i], load_vector(total, i)))
-            store_vector(V, i, v_i)
-            store_vector(X, i, add(load_vector(X, i), scale(h, v_i)))
-    overwrite(x, X)
-    overwrite(v, V)
+            v_i = add(load_vector(v, i), scale(h * mobility[i], load_vector(total, i)))
+            store_vector(v, i, v_i)
+            store_vector(x, i, add(load_vector(x, i), scale(h, v_i)))
     return are_bounded(x, v)
 
 
-def runge_kutta_steps(x, v, h, steps, constant, system):
-    """Make steps of the Runge-Kutta method in place, as `symplectic_euler_steps` does.
+def runge_kutta_steps(rows, h, steps, constant, system):
+    """Make steps of the Runge-Kutta method, as `symplectic_euler_steps` does.
 
-    x and v stay at the start of a step while X and V sum the rates of its stages.
+    `rows` are positions, velocities, forces, positions and velocities of a stage, and positions and
+    velocities at the start of a step, (7, particle, 4).
     """
-    X, V, total, mobility = rows_of(x), rows_of(v), rows_of(constant), mobilities(system)
-    springs = springs_in_lanes(system)
+    x, v, total, stage_x, stage_v = rows[0], rows[1], rows[2], rows[3], rows[4]
+    x_n, v_n = rows[5], rows[6]
+    mobility, springs = mobilities(system), springs_in_lanes(system)
     for _ in range(steps):
-        stage_x, stage_v = rows_of(x), rows_of(v)
+        for vectors in (stage_x, x_n):
+            overwrite(vectors, x)
+        for vectors in (stage_v, v_n):
+            overwrite(vectors, v)
         for shift, weight in STAGES:
             overwrite(total, constant)
             add_pulls_in_lanes(stage_x, stage_v, system, springs, total)
             for i in range(len(x)):
                 dx, dv = load_vector(stage_v, i), scale(mobility[i], load_vector(total, i))
-                store_vector(X, i, add(load_vector(X, i), scale(weight * h, dx)))
-                store_vector(V, i, add(load_vector(V, i), scale(weight * h, dv)))
-                store_vector(stage_x, i, add(load_vector(x, i), scale(shift * h, dx)))
-                store_vector(stage_v, i, add(load_vector(v, i), scale(shift * h, dv)))
-        overwrite(x, X)
-        overwrite(v, V)
+                store_vector(x, i, add(load_vector(x, i), scale(weight * h, dx)))
+                store_vector(v, i, add(load_vector(v, i), scale(weight * h, dv)))
+                store_vector(stage_x, i, add(load_vector(x_n, i), scale(shift * h, dx)))
+                store_vector(stage_v, i, add(load_vector(v_n, i), scale(shift * h, dv)))
     return are_bounded(x, v)
 
 
@@ -216,15 +227,10 @@ def springs_in_lanes(system):
 
     The least stretch is 0 for a tension-only spring, otherwise minus infinity.
     """
-    ropes = system.tension_only
-    return np.where(ropes, 0.0, -np.inf), ropes.any(), system.dampings.any()
-
-
-def rows_of(vectors):
-    """Return vectors as rows of four numbers, the last of them zero."""
-    rows = np.zeros((len(vectors), 4))
-    overwrite(rows, vectors)
-    return rows
+    slack, floors = system.tension_only.any(), np.empty(0)
+    if slack:
+        floors = np.where(system.tension_only, 0.0, -np.inf)
+    return floors, slack, system.dampings.any()
 
 
 def overwrite(target, source):
@@ -250,7 +256,8 @@ def mobilities(system):
     return mobility
 
 
+# The kernels, and the numbers of arrays of rows.
 _INTEGRATORS = {
-    "symplectic_euler": Kernel(symplectic_euler_steps),
-    "runge_kutta": Kernel(runge_kutta_steps),
+    "symplectic_euler": (Kernel(symplectic_euler_steps), 3),
+    "runge_kutta": (Kernel(runge_kutta_steps), 7),
 }
