@@ -344,8 +344,10 @@ class Row(NamedTuple):
 
     def exponent(self, name: str) -> float | None:
         """Return the power of the size with which a number grows, None if not known twice."""
-        numbers = [getattr(row, name) for row in (self, self.smaller) if row]
-        if self.smaller is None or None in numbers or min(numbers) <= 0.0:
+        if self.smaller is None or self.smaller.size == self.size:
+            return None
+        numbers = [getattr(row, name) for row in (self, self.smaller)]
+        if None in numbers or min(numbers) <= 0.0:
             return None
         return math.log(numbers[0] / numbers[1]) / math.log(self.size / self.smaller.size)
 
