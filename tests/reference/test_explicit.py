@@ -82,6 +82,15 @@ def net(request, rng):
     return system, State(x, rng.standard_normal((8, 3)))
 
 
+def assert_same_bits_at_both_speeds(integrator, system, state):
+    ends = []
+    for backend in compiled.BACKENDS:
+        with compiled.set_backend(backend):
+            ends.append(integrator(system, state, 0.01, steps=3))
+    np.testing.assert_array_equal(ends[0].positions, ends[1].positions)
+    np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 class TestEveryIntegrator:
     def test_eight_springs_at_once_pull_as_by_themselves(self, net, integrator, backend):
@@ -94,20 +103,10 @@ class TestEveryIntegrator:
         np.testing.assert_allclose(end.velocities, expected.velocities, rtol=0, atol=1e-12)
 
     def test_both_speeds_round_eight_springs_alike(self, net, integrator):
-        ends = []
-        for backend in compiled.BACKENDS:
-            with compiled.set_backend(backend):
-                ends.append(integrator(*net, 0.01, steps=3))
-        np.testing.assert_array_equal(ends[0].positions, ends[1].positions)
-        np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)
+        assert_same_bits_at_both_speeds(integrator, *net)
 
     def test_both_speeds_round_alike(self, network, integrator):
-        ends = []
-        for backend in compiled.BACKENDS:
-            with compiled.set_backend(backend):
-                ends.append(integrator(*network, 0.01, steps=3))
-        np.testing.assert_array_equal(ends[0].positions, ends[1].positions)
-        np.testing.assert_array_equal(ends[0].velocities, ends[1].velocities)
+        assert_same_bits_at_both_speeds(integrator, *network)
 
     def test_a_step_is_that_of_the_textbook(self, network, integrator, backend, rng):
         """With dampers, ropes, loads and a pin that moves 0.2 m."""
